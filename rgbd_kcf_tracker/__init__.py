@@ -1,0 +1,15 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Follow one target live in colour and depth, and say truthfully when it is hidden."""
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.trackers import Track, Tracker, TrackState, create_tracker
+
+__version__ = '0.1.0'
+__all__ = [
+    'Box', 'Frame', 'Intrinsics', 'RgbdKcfError', 'Track', 'TrackState', 'Tracker',
+    'create_tracker',
+]

@@ -1,0 +1,64 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One moment of the camera: what a source makes and a tracker takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.errors import ImageError
+from rgbd_kcf_tracker.geometry import Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """Colour, registered depth, stamp and camera of one moment.
+
+    Attributes:
+        color: ``(H, W, 3)`` uint8, BGR.
+        depth: ``(H, W)`` float32 metres along the optical axis, registered to ``color``, NaN where
+            there is no reading; None where the camera gave no depth for this moment.
+        stamp_ns: time of exposure in nanoseconds.
+        intrinsics: of the colour image, or None where unknown.
+
+    Raises:
+        ImageError: where a shape or type is not as above.
+    """
+
+    color: npt.NDArray[np.uint8]
+    depth: npt.NDArray[np.float32] | None = None
+    stamp_ns: int = 0
+    intrinsics: Intrinsics | None = None
+
+    def __post_init__(self) -> None:
+        color = self.color
+        if color.ndim != 3 or color.shape[2] != 3 or color.dtype != np.uint8 or color.size == 0:
+            raise ImageError(
+                f'colour image is {color.shape} {color.dtype}: expected (height, width, 3) uint8 BGR'
+            )
+        depth = self.depth
+        if depth is None:
+            return
+        if depth.dtype != np.float32 or depth.ndim != 2:
+            raise ImageError(
+                f'depth image is {depth.shape} {depth.dtype}: expected (height, width) float32 metres'
+            )
+        if depth.shape != color.shape[:2]:
+            raise ImageError(
+                f'depth is {depth.shape[1]}x{depth.shape[0]} but colour is '
+                f'{color.shape[1]}x{color.shape[0]}: register the depth to the colour image first'
+            )
+
+    @property
+    def width(self) -> int:
+        """Columns of the colour image."""
+        return int(self.color.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Rows of the colour image."""
+        return int(self.color.shape[0])

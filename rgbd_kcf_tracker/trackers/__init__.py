@@ -1,0 +1,69 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The trackers, one file per variant, and the way to make one by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.parameters import Parameters
+from rgbd_kcf_tracker.trackers.kcf import KcfParameters, KcfTracker
+from rgbd_kcf_tracker.trackers.track import Track, Tracker, TrackState
+
+__all__ = [
+    'VARIANTS', 'Track', 'TrackState', 'Tracker', 'Variant', 'create_tracker',
+    'default_parameters',
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A tracker that users choose by name: its parameters' class and how to make it from them."""
+
+    name: str
+    summary: str
+    parameters: type[Parameters]
+    make: Callable[..., Tracker]
+
+
+VARIANTS: dict[str, Variant] = {
+    v.name: v
+    for v in (
+        Variant('kcf', 'colour-only kernelized correlation filter', KcfParameters, KcfTracker),
+    )
+}
+DEFAULT_VARIANT = 'kcf'
+
+
+def _variant(name: str) -> Variant:
+    if name not in VARIANTS:
+        raise ParameterError(f'unknown variant {name!r}: choose one of {", ".join(VARIANTS)}')
+    return VARIANTS[name]
+
+
+def default_parameters(name: str) -> Parameters:
+    """The released defaults of a variant.
+
+    Raises:
+        ParameterError: for an unknown variant.
+    """
+    return _variant(name).parameters()
+
+
+def create_tracker(variant: str = DEFAULT_VARIANT, parameters: Parameters | None = None) -> Tracker:
+    """A tracker by its variant's name, with the released defaults or the given parameters.
+
+    Raises:
+        ParameterError: for an unknown variant, or parameters of another one.
+    """
+    chosen = _variant(variant)
+    if parameters is None:
+        parameters = chosen.parameters()
+    if not isinstance(parameters, chosen.parameters):
+        raise ParameterError(
+            f'variant {variant} takes {chosen.parameters.__name__}, not {type(parameters).__name__}'
+        )
+    return chosen.make(parameters)

@@ -1,0 +1,88 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a tracker says of one frame, and the contract that every tracker keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from rgbd_kcf_tracker.errors import BoxError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+
+
+class TrackState(Enum):
+    """Where the target is, as far as the tracker knows."""
+
+    IDLE = 'idle'
+    """No target was given."""
+    TRACKING = 'tracking'
+    """The target is seen: there is a box."""
+    OCCLUDED = 'occluded'
+    """Hidden and expected back near where it went: no box."""
+    LOST = 'lost'
+    """Given up looking near, searching everywhere: no box."""
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A tracker's answer to one frame.
+
+    Attributes:
+        box: where the visible part of the target is, in pixels; None unless ``state`` is TRACKING.
+        state: see :class:`TrackState`.
+        score: how sure the tracker is that ``box`` is right, 0 to 1; 0 without a box.
+        depth: distance of the target along the optical axis in metres; None where unknown.
+        position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
+            forward, x right, y down); None where depth or intrinsics are unknown.
+    """
+
+    box: Box | None
+    state: TrackState
+    score: float = 0.0
+    depth: float | None = None
+    position: tuple[float, float, float] | None = None
+
+    @property
+    def occluded(self) -> bool:
+        """True while a target is followed but not seen; what goes out on ``~/occluded``."""
+        return self.state in (TrackState.OCCLUDED, TrackState.LOST)
+
+
+class Tracker(Protocol):
+    """The two-method contract: start on a box, then one update per frame, in time order."""
+
+    def start(self, frame: Frame, box: Box) -> Track:
+        """Take the target in ``box`` of ``frame``, forgetting any other.
+
+        Returns the track of this first frame, which is the given box.
+
+        Raises:
+            BoxError: where the box lies wholly outside the image.
+        """
+        ...
+
+    def update(self, frame: Frame) -> Track:
+        """Follow the target into ``frame``. Never raises for what the picture shows.
+
+        Before :meth:`start`, the answer is IDLE. A frame of another size than the first is taken
+        as a restart of the stream: the tracker goes on with what it remembers where it can.
+        """
+        ...
+
+
+def require_inside(box: Box, frame: Frame) -> None:
+    """Refuse a first box that shows nothing of the image.
+
+    Raises:
+        BoxError: where no whole pixel of the box lies inside the frame.
+    """
+    inside = box.clipped(frame.width, frame.height)
+    if inside is None or inside.width < 1 or inside.height < 1:
+        raise BoxError(
+            f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} lies outside the '
+            f'{frame.width}x{frame.height} image: give x,y,width,height in pixels of the colour image'
+        )
