@@ -1,0 +1,106 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What every test may use: the recorded data, where it lies, and a ROS domain of its own."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+# Field checks are off by default in Jazzy; without them a wrong type serialises garbage silently.
+# rclpy's generated messages read this when they are imported, so it is set before any of them is.
+os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')
+# Pictures are drawn into files only.
+os.environ.setdefault('MPLBACKEND', 'Agg')
+
+PROJECT = Path(__file__).resolve().parent.parent
+# Above 101 the ports of a domain fall into Linux's ephemeral range, until 215.
+DOMAINS = (*range(1, 102), *range(215, 233))
+
+
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A ROS domain id that no other test of this machine has, whatever process it runs in.
+
+    A file lock marks the domain as taken; the kernel releases it when the process dies.
+    """
+    folder = Path(tempfile.gettempdir()) / f'rgbd_kcf_tracker_domains_{os.getuid()}'
+    folder.mkdir(exist_ok=True)
+    # Each process starts at another place, so that a domain is not reused at once.
+    start = os.getpid() * 7
+    for offset in range(len(DOMAINS)):
+        domain = DOMAINS[(start + offset) % len(DOMAINS)]
+        with (folder / str(domain)).open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    pytest.fail('every ROS domain id is taken by another running test')
+
+
+@contextmanager
+def ros_environment(log_folder: Path) -> Iterator[int]:
+    """Keep the nodes that a test starts, in and out of its process, apart from all others."""
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        patch.setenv('ROS_PYTHON_CHECK_FIELDS', '1')
+        patch.setenv('ROS_LOG_DIR', str(log_folder))
+        patch.delenv('ROS_STATIC_PEERS', raising=False)
+        patch.delenv('ROS_LOCALHOST_ONLY', raising=False)
+        yield domain
+
+
+@pytest.fixture(scope='module')
+def module_ros_domain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """One domain for the whole module: for nodes that live through several tests."""
+    with ros_environment(tmp_path_factory.mktemp('ros_log')) as domain:
+        yield domain
+
+
+@pytest.fixture(autouse=True)
+def _own_ros_domain(request: pytest.FixtureRequest) -> Iterator[None]:
+    if request.node.get_closest_marker('ros') is None:
+        yield
+        return
+    pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+    if 'module_ros_domain' in request.fixturenames:
+        yield
+        return
+    folder = request.getfixturevalue('tmp_path_factory').mktemp('ros_log')
+    with ros_environment(folder):
+        yield
+
+
+@pytest.fixture
+def ros_domain() -> int:
+    """The domain id that this test has for itself (only for tests marked ``ros``)."""
+    return int(os.environ['ROS_DOMAIN_ID'])
+
+
+def _find_shared_data() -> Path | None:
+    named = os.environ.get('RGBD_KCF_DATA')
+    if named is not None:
+        return Path(named) if Path(named).is_dir() else None
+    beside = PROJECT.parent / 'shared' / 'data'
+    return beside if beside.is_dir() else None
+
+
+@pytest.fixture(scope='session')
+def shared_data() -> Path:
+    """The folder of recorded data, read-only; the test is skipped where there is none."""
+    folder = _find_shared_data()
+    if folder is None:
+        pytest.skip(
+            'no recorded data: set RGBD_KCF_DATA to its folder, or put it in ../shared/data'
+        )
+    return folder
