@@ -100,7 +100,5 @@ def shared_data() -> Path:
     """The folder of recorded data, read-only; the test is skipped where there is none."""
     folder = _find_shared_data()
     if folder is None:
-        pytest.skip(
-            'no recorded data: set RGBD_KCF_DATA to its folder, or put it in ../shared/data'
-        )
+        pytest.skip('no recorded data: name its folder in RGBD_KCF_DATA, or have ../shared/data')
     return folder

@@ -1,0 +1,117 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How the package is installed, by pip and by colcon alike.
+
+Metadata and entry points stay here and out of pyproject.toml: colcon loses scripts that are written
+there when it builds with ``--symlink-install``.
+"""
+
+import re
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+HERE = Path(__file__).resolve().parent
+NAME = 'rgbd_kcf_tracker'
+
+# Where apt or colcon already brought ROS 2, nothing of this extra is needed. The versions belong
+# together: without them pip mixes in another distribution of ROS.
+ROS = [
+    'ros-rclpy[fastrtps]==7.1.6',
+    'ros-sensor-msgs==5.3.6',
+    'ros-std-msgs==5.3.6',
+    'ros-geometry-msgs==5.3.6',
+    'ros-std-srvs==5.3.6',
+    'ros-diagnostic-msgs==5.3.6',
+    'ros-visualization-msgs==5.3.6',
+    'ros-lifecycle-msgs==2.0.3',
+    'ros-rosgraph-msgs==2.0.3',
+]
+TEST = [
+    'pytest>=8',
+    'pytest-timeout',
+    'pytest-xdist',
+    'hypothesis',
+    'psutil',
+    'colcon-common-extensions',
+    'setuptools>=64,<80',  # colcon refuses later ones
+]
+LINT = [
+    'ruff==0.17.5',
+    'mypy==2.4.1',
+    'types-PyYAML',
+]
+
+
+def version() -> str:
+    """The version as the package states it."""
+    text = (HERE / NAME / '__init__.py').read_text(encoding='utf-8')
+    match = re.search(r"^__version__ = '([^']+)'$", text, re.MULTILINE)
+    if match is None:
+        raise RuntimeError(f'{NAME}/__init__.py states no __version__')
+    return match.group(1)
+
+
+def shared(folder: str, *patterns: str) -> tuple[str, list[str]]:
+    """The files of a folder that belong under share/, by setup.py's rules as relative paths."""
+    files = sorted(p for pattern in patterns for p in (HERE / folder).glob(pattern))
+    return f'share/{NAME}/{folder}', [str(p.relative_to(HERE)) for p in files]
+
+
+setup(
+    name=NAME,
+    version=version(),
+    description='RGB-D single-target tracking for ROS 2: boxes at camera rate, and the truth '
+    'about when the target is hidden',
+    long_description=(HERE / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    author='The rgbd_kcf_tracker authors',
+    maintainer='The rgbd_kcf_tracker authors',
+    license='Apache-2.0',
+    license_files=['LICENSE'],
+    keywords=['ROS', 'tracking', 'RGB-D', 'Kinect', 'correlation filter', 'occlusion'],
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Intended Audience :: Developers',
+        'Intended Audience :: Science/Research',
+        'License :: OSI Approved :: Apache Software License',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3',
+        'Topic :: Scientific/Engineering :: Image Recognition',
+        'Typing :: Typed',
+    ],
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        shared('config', '*.yaml', '*.xml', '*.rviz'),
+        shared('launch', '*.py', '*.yaml', '*.xml'),
+    ],
+    python_requires='>=3.10',
+    install_requires=[
+        'numpy>=1.26',
+        'scipy>=1.10',
+        'opencv-python-headless>=4.6',
+        'rosbags>=0.11',
+        'mcap>=1.1',
+        'mcap-ros2-support>=0.5',
+        'lz4',
+        'zstandard',
+        'PyYAML',
+        'tqdm',
+        'matplotlib>=3.7',
+        'jinja2',
+        'imageio-ffmpeg',
+    ],
+    extras_require={'ros': ROS, 'test': TEST, 'lint': LINT},
+    zip_safe=False,
+    entry_points={
+        'console_scripts': [
+            'rgbd-kcf = rgbd_kcf_tracker.cli.main:main',
+            'tracker = rgbd_kcf_tracker.ros.tracker_main:main',
+            'replay = rgbd_kcf_tracker.ros.replay_main:main',
+        ],
+    },
+)
