@@ -1,0 +1,28 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Every measure as a pure function: arrays or boxes in, numbers out.
+
+:func:`measure_boxes` gives all of a sequence's numbers at once; the modules hold the parts, one
+idea each: ``boxes`` (overlap, centre error), ``princeton``, ``otb``, ``confusion``, ``vot``
+(short-term), ``longterm``, ``calibration``.
+"""
+
+from rgbd_kcf_tracker.evaluation.metrics.comparison import Comparison, compare
+from rgbd_kcf_tracker.evaluation.metrics.summary import (
+    Measures,
+    mean,
+    measure,
+    measure_boxes,
+    pooled_counts,
+)
+
+__all__ = [
+    'Comparison',
+    'Measures',
+    'compare',
+    'mean',
+    'measure',
+    'measure_boxes',
+    'pooled_counts',
+]

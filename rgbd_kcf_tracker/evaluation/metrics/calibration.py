@@ -1,0 +1,71 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a published score means what it says: of the boxes scored 0.8, are 80 % right?
+
+Source: Guo et al., "On Calibration of Modern Neural Networks", 2017 (reliability diagram, expected
+calibration error); Brier, 1950.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+
+BINS = 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reliability:
+    """Boxes binned by score.
+
+    Attributes:
+        edges: ``(B + 1,)`` from 0 to 1; a bin holds its upper edge, the first one both.
+        counts: ``(B,)`` boxes in each bin.
+        mean_score: ``(B,)`` their mean score, NaN in an empty bin.
+        hit_rate: ``(B,)`` share of them that are right, NaN in an empty bin.
+        expected_error: mean distance of the two, weighted by counts; NaN without boxes.
+        brier: mean squared distance of score and outcome (1 right, 0 wrong); NaN without boxes.
+    """
+
+    edges: Array
+    counts: npt.NDArray[np.int64]
+    mean_score: Array
+    hit_rate: Array
+    expected_error: float
+    brier: float
+
+
+def reliability(scores: Array, hits: Mask, bins: int = BINS) -> Reliability:
+    """Reliability of the boxes' scores.
+
+    Args:
+        scores: ``(N,)`` score of each box given; values outside 0 to 1 are clipped, NaN left out.
+        hits: ``(N,)`` whether the box is right.
+        bins: number of equal bins.
+    """
+    known = ~np.isnan(scores)
+    s, h = np.clip(scores[known], 0.0, 1.0), hits[known].astype(np.float64)
+    edges = np.linspace(0.0, 1.0, bins + 1)
+    index = np.clip(np.ceil(s * bins).astype(np.int64) - 1, 0, bins - 1)
+    counts = np.bincount(index, minlength=bins)
+    some = np.maximum(counts, 1)
+    empty = counts == 0
+    mean_score = np.where(empty, np.nan, np.bincount(index, s, bins) / some)
+    hit_rate = np.where(empty, np.nan, np.bincount(index, h, bins) / some)
+    if not len(s):
+        return Reliability(edges, counts, mean_score, hit_rate, math.nan, math.nan)
+    gap = np.nan_to_num(np.abs(mean_score - hit_rate))
+    return Reliability(
+        edges,
+        counts,
+        mean_score,
+        hit_rate,
+        expected_error=float(np.sum(gap * counts) / counts.sum()),
+        brier=float(np.mean((s - h) ** 2)),
+    )
