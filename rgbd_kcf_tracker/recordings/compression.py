@@ -1,0 +1,73 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Decompression that trusts no size and gives what a cut-off stream still holds."""
+
+from __future__ import annotations
+
+import bz2
+from typing import Any
+
+from rgbd_kcf_tracker.errors import RecordingError
+
+MAX_UNPACKED = 1 << 30
+"""Largest chunk or message that is unpacked: 1 GiB."""
+
+
+def unpack(method: str, data: bytes, expected: int | None = None) -> bytes:
+    """``data`` decompressed; as much as there is, where it is cut off.
+
+    Args:
+        method: '', 'none', 'zstd', 'lz4' (frame format) or 'bz2'.
+        data: compressed bytes.
+        expected: number of bytes that should come out, where known.
+
+    Raises:
+        RecordingError: for an unknown method, damaged data, or more than :data:`MAX_UNPACKED`.
+    """
+    if method in ('', 'none'):
+        return data
+    limit = MAX_UNPACKED if expected is None else expected
+    if limit > MAX_UNPACKED:
+        raise RecordingError(f'a chunk claims {limit} bytes: more than {MAX_UNPACKED} are not read')
+    try:
+        if method == 'zstd':
+            return _unzstd(data, limit)
+        if method == 'lz4':
+            import lz4.frame  # type: ignore[import-untyped]
+
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=limit))
+        if method == 'bz2':
+            return bz2.BZ2Decompressor().decompress(data, max_length=limit)
+    except RecordingError:
+        raise
+    except ImportError as error:
+        raise RecordingError(
+            f'{method} compression needs the Python package {error.name}: install it'
+        ) from None
+    except Exception as error:
+        raise RecordingError(f'{method} data is damaged: {error}') from None
+    raise RecordingError(f'compression {method!r} is not known: zstd, lz4 and bz2 are')
+
+
+def _unzstd(data: bytes, limit: int) -> bytes:
+    import zstandard
+
+    # A reader, as the one-call function allocates whatever size the frame's own head claims.
+    reader: Any = zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(
+        data, read_across_frames=True
+    )
+    parts: list[bytes] = []
+    left = limit
+    while left > 0:
+        try:
+            part = reader.read(min(left, 1 << 24))
+        except zstandard.ZstdError:
+            if not parts:
+                raise
+            break
+        if not part:
+            break
+        parts.append(part)
+        left -= len(part)
+    return parts[0] if len(parts) == 1 else b''.join(parts)

@@ -1,0 +1,216 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""MCAP files, with or without index, whole or cut off.
+
+The records are those of the MCAP specification (mcap.dev/spec). Chunks that are not compressed are
+never read as a whole: the scan skips from message to message.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections import OrderedDict
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+from mcap.data_stream import ReadDataStream
+from mcap.records import Channel, Schema
+
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.compression import unpack
+from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
+
+MAGIC = b'\x89MCAP0\r\n'
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
+_RECORD = struct.Struct('<BQ')
+_MESSAGE_HEAD = struct.Struct('<HIQQ')
+_CHUNK_HEAD = struct.Struct('<QQQI')
+_CACHED_CHUNKS = 4
+
+
+class _File:
+    """Bytes of a file by position, without a buffer of its own."""
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open('rb', buffering=0)
+        self.size = os.fstat(self._file.fileno()).st_size
+
+    def read(self, at: int, length: int) -> bytes:
+        self._file.seek(at)
+        return self._file.read(length) or b''
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class _Memory:
+    """Bytes of an unpacked chunk by position."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self.size = len(data)
+
+    def read(self, at: int, length: int) -> bytes:
+        return self._data[at : at + length]
+
+
+class McapStorage:
+    """A :class:`Storage` of one ``.mcap`` file.
+
+    Raises:
+        RecordingError: where the file cannot be opened or is no MCAP file.
+    """
+
+    ros1 = False
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.topics: dict[str, str] = {}
+        self.definitions: dict[str, Definition] = {}
+        self.warnings: list[str] = []
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, tuple[str, str]] = {}
+        # Place of a compressed chunk: method, place of its data, their length, unpacked length.
+        self._chunks: dict[int, tuple[str, int, int, int]] = {}
+        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        try:
+            self._file = _File(path)
+        except OSError as error:
+            raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+        magic = self._file.read(0, len(MAGIC))
+        if magic != MAGIC:
+            self._file.close()
+            if not magic:
+                raise RecordingError(f'{path} is empty: nothing was recorded')
+            raise RecordingError(f'{path} is no MCAP file: it does not begin as one')
+
+    def scan(self) -> Iterator[Scanned]:
+        """See :meth:`Storage.scan`."""
+        at, end = len(MAGIC), self._file.size
+        while at + _RECORD.size <= end:
+            opcode, length = _RECORD.unpack(self._file.read(at, _RECORD.size))
+            body = at + _RECORD.size
+            at = body + length
+            if opcode == _DATA_END:
+                return
+            if opcode == _CHUNK:
+                yield from self._chunk(body, min(length, end - body))
+            elif opcode == 0:
+                break
+            elif at <= end:
+                scanned = self._record(opcode, self._file, body, length, None)
+                if scanned is not None:
+                    yield scanned
+        self.warnings.append(
+            f'{self.path} was cut off or not closed: all whole messages in it are read'
+        )
+
+    def read(self, where: Where) -> bytes:
+        """See :meth:`Storage.read`."""
+        chunk, at, length = where
+        data = self._file.read(at, length) if chunk < 0 else self._unpacked(chunk)[at : at + length]
+        if len(data) != length:
+            raise RecordingError(f'{self.path} became shorter while it was read')
+        return data
+
+    def close(self) -> None:
+        """See :meth:`Storage.close`."""
+        self._file.close()
+        self._cache.clear()
+
+    def _record(
+        self, opcode: int, source: _File | _Memory, body: int, length: int, chunk: int | None
+    ) -> Scanned | None:
+        if opcode == _MESSAGE:
+            return self._message(source, body, length, chunk)
+        if opcode in (_SCHEMA, _CHANNEL):
+            self._describe(opcode, source.read(body, length))
+        return None
+
+    def _message(
+        self, source: _File | _Memory, body: int, length: int, chunk: int | None
+    ) -> Scanned | None:
+        start = _MESSAGE_HEAD.size
+        if length < start:
+            return None
+        head = source.read(body, min(start + HEAD, length))
+        channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(head)
+        if channel not in self._channels:
+            return None
+        topic, kind = self._channels[channel]
+        where = (-1 if chunk is None else chunk, body + start, length - start)
+        return Scanned(topic, kind, log_ns, head[start:], where)
+
+    def _chunk(self, body: int, available: int) -> Iterator[Scanned]:
+        head = self._file.read(body, min(available, _CHUNK_HEAD.size + 64))
+        try:
+            _, _, size, _ = _CHUNK_HEAD.unpack_from(head)
+            (name_length,) = struct.unpack_from('<I', head, _CHUNK_HEAD.size)
+            at = _CHUNK_HEAD.size + 4 + name_length
+            method = head[_CHUNK_HEAD.size + 4 : at].decode('ascii')
+            (packed,) = struct.unpack_from('<Q', head, at)
+        except (struct.error, UnicodeDecodeError):
+            return
+        data = body + at + 8
+        packed = min(packed, available - at - 8)
+        if method == '':
+            yield from self._inside(self._file, data, data + packed, None)
+            return
+        self._chunks[body] = (method, data, packed, size)
+        try:
+            memory = _Memory(self._unpacked(body))
+        except RecordingError as error:
+            self.warnings.append(f'{self.path}: a chunk at byte {body} is left out: {error}')
+            return
+        yield from self._inside(memory, 0, memory.size, body)
+
+    def _inside(
+        self, source: _File | _Memory, at: int, end: int, chunk: int | None
+    ) -> Iterator[Scanned]:
+        while at + _RECORD.size <= end:
+            opcode, length = _RECORD.unpack(source.read(at, _RECORD.size))
+            body = at + _RECORD.size
+            at = body + length
+            if at > end:
+                return
+            scanned = self._record(opcode, source, body, length, chunk)
+            if scanned is not None:
+                yield scanned
+
+    def _describe(self, opcode: int, data: bytes) -> None:
+        stream = ReadDataStream(BytesIO(data))
+        try:
+            if opcode == _SCHEMA:
+                schema = Schema.read(stream)
+                self._schemas[schema.id] = schema.name
+                if schema.data:
+                    text = schema.data.decode('utf-8', 'replace')
+                    self.definitions[schema.name] = Definition(schema.encoding, text)
+                return
+            channel = Channel.read(stream)
+        except Exception:
+            self.warnings.append(f'{self.path}: a damaged description of a topic is left out')
+            return
+        if channel.message_encoding != 'cdr':
+            self.warnings.append(
+                f'{self.path}: topic {channel.topic} is in {channel.message_encoding!r}, '
+                'not in cdr, and is left out'
+            )
+            return
+        kind = self._schemas.get(channel.schema_id, '')
+        self._channels[channel.id] = (channel.topic, kind)
+        self.topics[channel.topic] = kind
+
+    def _unpacked(self, chunk: int) -> bytes:
+        if chunk in self._cache:
+            self._cache.move_to_end(chunk)
+            return self._cache[chunk]
+        method, at, length, size = self._chunks[chunk]
+        data = unpack(method, self._file.read(at, length), size)
+        self._cache[chunk] = data
+        while len(self._cache) > _CACHED_CHUNKS:
+            self._cache.popitem(last=False)
+        return data

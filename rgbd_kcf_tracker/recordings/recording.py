@@ -1,0 +1,155 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What every source of recorded frames offers, and how to choose what is read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S
+
+NO_DEPTH = 'none'
+"""As ``depth_topic``: read colour alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOptions:
+    """How a recording is read.
+
+    Attributes:
+        color_topic: the colour topic of a bag, or None to find it.
+        depth_topic: the depth topic of a bag, None to find it, ``'none'`` to read colour alone.
+        info_topic: the CameraInfo topic of a bag, or None to find it.
+        tolerance_s: largest distance of stamps, in seconds, within a colour and depth pair.
+        fps: frames per second of a sequence folder without ``timestamps.txt``.
+        intrinsics: used instead of the recording's own.
+
+    Raises:
+        ParameterError: for a negative tolerance or a rate that is not above 0.
+    """
+
+    color_topic: str | None = None
+    depth_topic: str | None = None
+    info_topic: str | None = None
+    tolerance_s: float = DEFAULT_TOLERANCE_S
+    fps: float = 30.0
+    intrinsics: Intrinsics | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.fps <= 1e6:
+            raise ParameterError(f'fps is {self.fps:g}: it must be above 0')
+        if not 0 <= self.tolerance_s <= 3600:
+            raise ParameterError(f'tolerance is {self.tolerance_s:g} s: it must be 0 or more')
+
+
+@dataclass(frozen=True, slots=True)
+class StreamInfo:
+    """One topic, folder or file of a recording, for people to read.
+
+    Attributes:
+        name: topic, or name of the folder or file.
+        type: message type, or kind of file.
+        count: messages or files.
+        rate_hz: of the stamps, median; None where unknown.
+        size: ``(width, height)`` of the first image, None where it is none.
+        encoding: of the first image, as in the message or the file's kind.
+        role: 'color', 'depth', 'info' or 'truth' for what is used, else ''.
+    """
+
+    name: str
+    type: str
+    count: int
+    rate_hz: float | None = None
+    size: tuple[int, int] | None = None
+    encoding: str = ''
+    role: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingInfo:
+    """What is in a recording; made by :meth:`Recording.info`.
+
+    Attributes:
+        path: where it lies.
+        kind: for instance 'mcap', 'rosbag2 folder (sqlite3)', 'ROS 1 bag', 'sequence folder'.
+        frames: how many frames it gives.
+        frames_with_depth: how many of them have depth.
+        duration_s: between the first and the last stamp.
+        rate_hz: median rate of the frames; None below two frames.
+        streams: all topics or folders.
+        intrinsics: of the colour camera, None where unknown.
+        truth_frames: frames with a ground-truth box; None without ground truth.
+        problem: why no frames can be read (as the error says it), or ''.
+        warnings: what was odd.
+    """
+
+    path: Path
+    kind: str
+    frames: int
+    frames_with_depth: int
+    duration_s: float
+    rate_hz: float | None
+    streams: tuple[StreamInfo, ...]
+    intrinsics: Intrinsics | None = None
+    truth_frames: int | None = None
+    problem: str = ''
+    warnings: tuple[str, ...] = field(default=())
+
+
+class Recording(Protocol):
+    """A source of frames in time order. Use it in a ``with`` block, or :meth:`close` it.
+
+    Attributes:
+        name: short name, without folders and suffix.
+        path: where it lies.
+        groundtruth: box of the visible part per frame, None where absent. The list may be shorter
+            than the recording: frames after its end are not annotated. None: no ground truth.
+        groundtruth_body: the same for the whole body, None where not given.
+        intrinsics: of the colour camera, or None.
+        warnings: what was odd, in whole sentences; grows while frames are read.
+    """
+
+    name: str
+    path: Path
+    groundtruth: list[Box | None] | None
+    groundtruth_body: list[Box | None] | None
+    intrinsics: Intrinsics | None
+    warnings: list[str]
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        ...
+
+    def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
+        """The frames from ``start`` up to and without ``end``, in time order.
+
+        Raises:
+            RecordingError: where the recording cannot be read on.
+            ImageError: for a colour image that cannot be decoded, naming it.
+        """
+        ...
+
+    def info(self) -> RecordingInfo:
+        """What is in the recording."""
+        ...
+
+    def close(self) -> None:
+        """Close the files."""
+        ...
+
+    def __enter__(self) -> Recording: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...

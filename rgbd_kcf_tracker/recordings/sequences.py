@@ -1,0 +1,209 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Sequence folders: numbered images in ``rgb/`` and ``depth/`` with text files beside them."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from types import TracebackType
+
+from rgbd_kcf_tracker.errors import ImageError, RecordingError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.containers import inspect
+from rgbd_kcf_tracker.recordings.images import (
+    ColorImage,
+    DepthImage,
+    decode_color_bytes,
+    decode_depth_bytes,
+)
+from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
+from rgbd_kcf_tracker.recordings.textfiles import (
+    natural_key,
+    read_boxes,
+    read_intrinsics,
+    read_stamps,
+)
+
+IMAGE_SUFFIXES = frozenset({'.png', '.jpg', '.jpeg', '.tif', '.tiff'})
+COLOR_FOLDERS = ('rgb', 'color', 'img')
+DEPTH_FOLDER = 'depth'
+
+
+def is_sequence_folder(path: Path) -> bool:
+    """Whether ``path`` is a folder with a folder of colour images in it."""
+    return any((path / name).is_dir() for name in COLOR_FOLDERS)
+
+
+class SequenceFolder:
+    """A :class:`Recording` of a folder with ``rgb/``.
+
+    Read where they are there: ``depth/``, ``groundtruth.txt``,
+    ``groundtruth_body.txt``, ``timestamps.txt`` and ``intrinsics.json``.
+
+    A depth image belongs to the colour image of the same name (without suffix).
+
+    Raises:
+        RecordingError: where the folder or one of its files is not as it should be.
+    """
+
+    def __init__(self, path: Path, options: ReadOptions) -> None:
+        self.path = path
+        self.name = path.resolve().name
+        self.warnings: list[str] = []
+        self._color_folder = next(path / n for n in COLOR_FOLDERS if (path / n).is_dir())
+        self._colors = _images(self._color_folder)
+        if not self._colors:
+            raise RecordingError(f'{self._color_folder} holds no images (PNG, JPEG or TIFF)')
+        self._depths = self._find_depths(options)
+        self._stamps = self._read_stamps(options)
+        self.intrinsics: Intrinsics | None = options.intrinsics
+        if self.intrinsics is None and (path / 'intrinsics.json').exists():
+            self.intrinsics = read_intrinsics(path / 'intrinsics.json')
+        self.groundtruth = self._read_truth('groundtruth.txt')
+        self.groundtruth_body = self._read_truth('groundtruth_body.txt')
+
+    def __len__(self) -> int:
+        return len(self._colors)
+
+    def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
+        """See :meth:`Recording.frames`."""
+        for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
+            path = self._colors[index]
+            color = _decode_color(path)
+            depth_path = self._depths[index]
+            depth = None if depth_path is None else self._decode_depth(depth_path)
+            try:
+                yield Frame(color, depth, self._stamps[index], self.intrinsics)
+            except ImageError as error:
+                raise ImageError(f'{depth_path}: {error}') from None
+
+    def info(self) -> RecordingInfo:
+        """See :meth:`Recording.info`."""
+        gaps = [b - a for a, b in pairwise(self._stamps) if b > a]
+        rate = 1e9 / statistics.median(gaps) if gaps else None
+        depths = [p for p in self._depths if p is not None]
+        streams = [_stream(self._color_folder.name, self._colors, rate, 'color')]
+        if depths:
+            streams.append(_stream(DEPTH_FOLDER, depths, rate, 'depth'))
+        for name, boxes in (
+            ('groundtruth.txt', self.groundtruth),
+            ('groundtruth_body.txt', self.groundtruth_body),
+        ):
+            if boxes is not None:
+                streams.append(StreamInfo(name, 'boxes', len(boxes), role='truth'))
+        truth = self.groundtruth
+        return RecordingInfo(
+            path=self.path,
+            kind='sequence folder',
+            frames=len(self),
+            frames_with_depth=len(depths),
+            duration_s=(self._stamps[-1] - self._stamps[0]) / 1e9,
+            rate_hz=rate,
+            streams=tuple(streams),
+            intrinsics=self.intrinsics,
+            truth_frames=None if truth is None else sum(b is not None for b in truth),
+            warnings=tuple(self.warnings),
+        )
+
+    def close(self) -> None:
+        """Nothing stays open."""
+
+    def __enter__(self) -> SequenceFolder:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _find_depths(self, options: ReadOptions) -> list[Path | None]:
+        folder = self.path / DEPTH_FOLDER
+        if not folder.is_dir() or options.depth_topic == 'none':
+            return [None] * len(self._colors)
+        by_stem = {p.stem: p for p in _images(folder)}
+        depths = [by_stem.get(p.stem) for p in self._colors]
+        missing = sum(p is None for p in depths)
+        if missing == len(depths):
+            raise RecordingError(
+                f'no image in {folder} has the name of one in {self._color_folder}: '
+                'give colour and depth of a frame the same number'
+            )
+        if missing:
+            self.warnings.append(f'{missing} of {len(depths)} colour images have no depth image')
+        return depths
+
+    def _read_stamps(self, options: ReadOptions) -> list[int]:
+        path = self.path / 'timestamps.txt'
+        if not path.exists():
+            return [round(index * 1e9 / options.fps) for index in range(len(self._colors))]
+        stamps = read_stamps(path)
+        if len(stamps) != len(self._colors):
+            raise RecordingError(
+                f'{path} has {len(stamps)} lines for {len(self)} images: write one per image'
+            )
+        back = sum(b <= a for a, b in pairwise(stamps))
+        if back:
+            self.warnings.append(f'{path.name}: {back} stamps do not come after the one before')
+        return stamps
+
+    def _read_truth(self, name: str) -> list[Box | None] | None:
+        path = self.path / name
+        if not path.exists():
+            return None
+        boxes = read_boxes(path)
+        if len(boxes) > len(self):
+            self.warnings.append(
+                f'{name} has {len(boxes)} lines for {len(self)} images: the last are left out'
+            )
+        elif len(boxes) < len(self):
+            self.warnings.append(
+                f'{name} has {len(boxes)} lines for {len(self)} images: '
+                'the last images are taken as not annotated'
+            )
+        return boxes[: len(self)]
+
+    def _decode_depth(self, path: Path) -> DepthImage | None:
+        try:
+            return decode_depth_bytes(memoryview(_read(path)))
+        except ImageError as error:
+            self.warnings.append(f'{path}: {error}; the frame is read without depth')
+            return None
+
+
+def _images(folder: Path) -> list[Path]:
+    try:
+        found = [p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
+    except OSError as error:
+        raise RecordingError(f'{folder} cannot be read: {error.strerror or error}') from None
+    return sorted(found, key=lambda p: natural_key(p.name))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+
+
+def _decode_color(path: Path) -> ColorImage:
+    try:
+        return decode_color_bytes(memoryview(_read(path)))
+    except ImageError as error:
+        raise ImageError(f'{path}: {error}') from None
+
+
+def _stream(name: str, paths: list[Path], rate: float | None, role: str) -> StreamInfo:
+    try:
+        head = inspect(memoryview(_read(paths[0])))
+    except ImageError as error:
+        return StreamInfo(name, 'images', len(paths), rate, None, str(error), role)
+    encoding = f'{head.name} {head.channels}x{head.bits} bit'
+    return StreamInfo(name, 'images', len(paths), rate, (head.width, head.height), encoding, role)
