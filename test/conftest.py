@@ -55,7 +55,8 @@ def ros_environment(log_folder: Path) -> Iterator[int]:
         patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         patch.setenv('ROS_PYTHON_CHECK_FIELDS', '1')
         patch.setenv('ROS_LOG_DIR', str(log_folder))
-        patch.delenv('ROS_STATIC_PEERS', raising=False)
+        # Found without multicast too, as in many containers.
+        patch.setenv('ROS_STATIC_PEERS', '127.0.0.1')
         patch.delenv('ROS_LOCALHOST_ONLY', raising=False)
         yield domain
 

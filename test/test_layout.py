@@ -1,0 +1,157 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Imports go one way, and each layer uses only the libraries it may."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = 'rgbd_kcf_tracker'
+ROOT = Path(__file__).resolve().parent.parent
+SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
+
+# A layer imports from its own and from those below it.
+LAYERS = (
+    ('errors',),
+    ('parameters', 'geometry'),
+    ('frame',),
+    ('features',),
+    ('filters',),
+    ('trackers',),
+    ('recordings', 'simulation', 'evaluation'),
+    ('cli', 'ros'),
+)
+LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
+# Within the one layer of recordings, simulation and evaluation.
+SIDEWAYS = {
+    ('evaluation', 'recordings'),
+    ('evaluation', 'simulation'),
+    ('simulation', 'recordings'),
+}
+# The package's front door shows what users need and belongs to no layer.
+FRONT = '__init__'
+
+ROS_MODULES = {
+    'rclpy', 'rosidl_runtime_py', 'ament_index_python', 'launch', 'launch_ros', 'sensor_msgs',
+    'std_msgs', 'geometry_msgs', 'std_srvs', 'diagnostic_msgs', 'visualization_msgs', 'vision_msgs',
+    'lifecycle_msgs', 'rosgraph_msgs', 'rcl_interfaces', 'builtin_interfaces',
+}  # fmt: skip
+LEAN = {'features', 'filters', 'trackers', 'geometry', 'frame', 'parameters', 'errors'}
+LEAN_MODULES = {'numpy', 'scipy', 'cv2'} | set(sys.stdlib_module_names)
+
+
+def layer_of(path: Path) -> str:
+    parts = path.relative_to(ROOT / PACKAGE).parts
+    return parts[0].removesuffix('.py')
+
+
+def imports_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of every import, those inside functions included."""
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}:{node.lineno}: write the import in full'
+            assert node.module is not None
+            yield node.lineno, node.module
+            if node.module == PACKAGE:
+                for alias in node.names:
+                    yield node.lineno, f'{PACKAGE}.{alias.name}'
+
+
+def inner_layer(name: str) -> str | None:
+    parts = name.split('.')
+    if parts[0] != PACKAGE or len(parts) < 2:
+        return None
+    return parts[1] if parts[1] in LEVEL else None
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_go_one_way(path: Path) -> None:
+    layer = layer_of(path)
+    if layer in (FRONT, '__main__'):
+        return
+    assert layer in LEVEL, f'{layer} has no place among the layers: see ../shared/DESIGN.md'
+    for line, name in imports_of(path):
+        other = inner_layer(name)
+        if other is None or other == layer:
+            continue
+        allowed = LEVEL[other] < LEVEL[layer] or (layer, other) in SIDEWAYS
+        assert allowed, f'{path.relative_to(ROOT)}:{line}: {layer} must not import {other}'
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_libraries_of_each_layer(path: Path) -> None:
+    layer = layer_of(path)
+    for line, name in imports_of(path):
+        top = name.split('.')[0]
+        where = f'{path.relative_to(ROOT)}:{line}'
+        if layer != 'ros':
+            assert top not in ROS_MODULES, f'{where}: {top} belongs in ros/'
+        if layer in LEAN and top != PACKAGE:
+            assert top in LEAN_MODULES, f'{where}: {layer} must not need {top}'
+
+
+def test_every_library_is_declared() -> None:
+    """What the code imports is in setup.py, and in package.xml as a rosdep key."""
+    distributions = {
+        'numpy': ('numpy', 'python3-numpy'),
+        'scipy': ('scipy', 'python3-scipy'),
+        'cv2': ('opencv-python-headless', 'python3-opencv'),
+        'rosbags': ('rosbags', 'python3-rosbags-pip'),
+        'mcap': ('mcap', 'mcap-ros2-support'),
+        'mcap_ros2': ('mcap-ros2-support', 'mcap-ros2-support'),
+        'lz4': ('lz4', 'mcap-ros2-support'),  # comes with mcap
+        'zstandard': ('zstandard', 'mcap-ros2-support'),
+        'yaml': ('PyYAML', 'python3-yaml'),
+        'tqdm': ('tqdm', 'python3-tqdm'),
+        'matplotlib': ('matplotlib', 'python3-matplotlib'),
+        'jinja2': ('jinja2', 'python3-jinja2'),
+        'imageio_ffmpeg': ('imageio-ffmpeg', 'ffmpeg'),
+        'psutil': ('psutil', 'python3-psutil'),
+    }
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    manifest = (ROOT / 'package.xml').read_text(encoding='utf-8')
+    for path in SOURCES:
+        for line, name in imports_of(path):
+            top = name.split('.')[0]
+            where = f'{path.relative_to(ROOT)}:{line}'
+            if top == PACKAGE or top in sys.stdlib_module_names:
+                continue
+            if top in ROS_MODULES:
+                assert f'>{top}</exec_depend>' in manifest, f'{where}: {top} not in package.xml'
+                continue
+            assert top in distributions, f'{where}: {top} is declared nowhere'
+            distribution, key = distributions[top]
+            assert re.search(rf"'{re.escape(distribution)}\b", setup), f'{where}: not in setup.py'
+            assert f'>{key}</' in manifest, f'{where}: {key} not in package.xml'
+
+
+def test_engine_loads_without_ros() -> None:
+    """A plain script that uses the tracker brings in no ROS and no recording library."""
+    code = (
+        'import sys, rgbd_kcf_tracker\n'
+        'heavy = {"rclpy", "rosbags", "mcap", "matplotlib", "jinja2"} & set(sys.modules)\n'
+        'assert not heavy, heavy\n'
+    )
+    subprocess.run([sys.executable, '-c', code], check=True, cwd=ROOT, timeout=60)
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_file_states_its_licence(path: Path) -> None:
+    lines = path.read_text(encoding='utf-8').splitlines()
+    if path.name.startswith('_version') or not lines:
+        return
+    assert lines[:2] == [
+        '# Copyright 2026 The rgbd_kcf_tracker authors',
+        '# SPDX-License-Identifier: Apache-2.0',
+    ]
