@@ -1,0 +1,123 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What ``/diagnostics`` says of the node: one status, a sentence first, the figures after it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from rgbd_kcf_tracker.ros.statistics import Snapshot
+from rgbd_kcf_tracker.trackers import TrackState
+
+RECENT_ERROR_S = 5.0
+ALARMING_SHARE = 0.1
+"""A tenth of the images dropped or without partner is worth a warning."""
+LATENCY_NAMES = ('mean', 'median', 'p99', 'max')
+
+
+@dataclass(frozen=True, slots=True)
+class NodeState:
+    """What the node knows of itself beside the counts.
+
+    Attributes:
+        name: of the node, with its namespace.
+        lifecycle: label of the lifecycle state, 'active' when it works.
+        variant: of the tracker; empty before it is configured.
+        track: state of the target.
+        topic, depth_topic: where the images come from.
+        publishers, depth_publishers: how many publish there.
+        stale_after: seconds without images that make a silent camera.
+        uses_depth: whether the variant wants depth at all.
+    """
+
+    name: str
+    lifecycle: str
+    variant: str = ''
+    track: TrackState = TrackState.IDLE
+    topic: str = ''
+    depth_topic: str = ''
+    publishers: int = 0
+    depth_publishers: int = 0
+    stale_after: float = 2.0
+    uses_depth: bool = True
+
+
+def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
+    """Level and sentence: the worst of what is wrong, in words that say what to do."""
+    if state.lifecycle != 'active':
+        return DiagnosticStatus.OK, state.lifecycle
+    silent = _silence(state, snapshot)
+    if silent:
+        return DiagnosticStatus.ERROR, silent
+    if snapshot.error_age_s is not None and snapshot.error_age_s < RECENT_ERROR_S:
+        return DiagnosticStatus.WARN, snapshot.last_error
+    recent = snapshot.recent
+    came = max(recent.get('color_received', 0), 1)
+    if recent.get('dropped', 0) > ALARMING_SHARE * came:
+        return (
+            DiagnosticStatus.WARN,
+            f'tracking is slower than the camera: {recent["dropped"]} of {came} images dropped',
+        )
+    if state.uses_depth:
+        alone = recent.get('color_without_depth', 0)
+        if alone > ALARMING_SHARE * came:
+            return DiagnosticStatus.WARN, _without_depth(state, snapshot, alone, came)
+    return DiagnosticStatus.OK, state.track.name
+
+
+def _silence(state: NodeState, snapshot: Snapshot) -> str:
+    age = snapshot.image_age_s
+    if age is not None and age <= state.stale_after:
+        return ''
+    if state.publishers == 0:
+        return f'nobody publishes {state.topic}: is the camera running, is the topic remapped?'
+    since = 'yet' if age is None else f'for {age:.1f} s'
+    return (
+        f'no image on {state.topic} {since}, though it has a publisher: is the driver working, '
+        'does its QoS fit (see reliability)?'
+    )
+
+
+def _without_depth(state: NodeState, snapshot: Snapshot, alone: int, came: int) -> str:
+    if state.depth_publishers == 0:
+        return f'nobody publishes {state.depth_topic}: tracking on colour alone'
+    age = snapshot.depth_age_s
+    if age is None or age > state.stale_after:
+        return f'no depth image on {state.depth_topic}: tracking on colour alone'
+    return (
+        f'{alone} of {came} colour images found no depth of their time: are the streams '
+        'synchronised (see pair_tolerance)?'
+    )
+
+
+def diagnostics_message(stamp: Time, state: NodeState, snapshot: Snapshot) -> DiagnosticArray:
+    """The whole message."""
+    level, sentence = judge(state, snapshot)
+    values = {
+        'lifecycle': state.lifecycle,
+        'variant': state.variant,
+        'state': state.track.name,
+        'rate_hz': f'{snapshot.recent.get("processed", 0) / snapshot.seconds:.1f}',
+        'input_rate_hz': f'{snapshot.recent.get("color_received", 0) / snapshot.seconds:.1f}',
+    }
+    for what, summary in (('latency', snapshot.latency_ms), ('work', snapshot.work_ms)):
+        for name, value in zip(LATENCY_NAMES, summary, strict=False):
+            values[f'{what}_{name}_ms'] = f'{value:.2f}'
+    values |= {name: str(number) for name, number in sorted(snapshot.counts.items())}
+    values['last_error'] = snapshot.last_error
+    if snapshot.error_age_s is not None:
+        values['last_error_age_s'] = f'{snapshot.error_age_s:.1f}'
+    status = DiagnosticStatus(
+        level=level,
+        name=f'{state.name}: tracker',
+        message=sentence,
+        hardware_id=state.topic,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamp
+    return message

@@ -1,0 +1,67 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a node's process needs around the node: signals, and a loop that holds.
+
+SIGINT and SIGTERM end the loop; a second SIGINT (``ros2 launch`` sends one too, beside the
+terminal's) cannot interrupt the clean-up.
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from rgbd_kcf_tracker.ros.memory import keep_large_blocks
+
+__all__ = ['keep_large_blocks', 'run']
+
+_SPIN_PERIOD_S = 0.25
+
+
+def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
+    """Start ROS, make a node, and let it live until a signal; returns the exit status.
+
+    Args:
+        make: makes the node; an error that it raises is printed, and the status is 1.
+        args: the command line, sys.argv where None.
+    """
+    stop: list[int] = []
+
+    def on_signal(number: int, _: Any) -> None:
+        stop.append(number)
+
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    executor = SingleThreadedExecutor()
+    node: Node | None = None
+    try:
+        node = make()
+        executor.add_node(node)
+        while not stop and rclpy.ok():
+            try:
+                executor.spin_once(timeout_sec=_SPIN_PERIOD_S)
+            except (ExternalShutdownException, ShutdownException):
+                break
+            except Exception as error:  # one bad message or request must not end the node
+                node.get_logger().error(f'{type(error).__name__}: {error}')
+        return 0
+    except Exception as error:
+        print(f'cannot start: {error}', file=sys.stderr)
+        return 1
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+        if node is not None:
+            executor.remove_node(node)
+            node.destroy_node()
+        executor.shutdown(timeout_sec=0.5)
+        rclpy.try_shutdown()

@@ -1,0 +1,69 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A time that only moves forward, for trackers that think in seconds, out of stamps that may not.
+
+Cameras send stamps that are zero, equal, jump back (a bag that loops) or are years ahead (a clock
+not set). Headers of results always copy what the camera sent; this is the time that the tracker is
+given. As long as stamps behave, it is the stamp itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+NANOSECONDS = 1_000_000_000
+LARGEST_STEP_NS = 60 * NANOSECONDS
+"""A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
+LEAST_STEP_NS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One image's place in time.
+
+    Attributes:
+        time_ns: rising strictly; equal to the stamps until the first fault in them.
+        jumped: the stamps left their course here: back, or more than a minute ahead.
+        restarted: they went back for good, as a loop does; not the return from one wrong stamp.
+    """
+
+    time_ns: int
+    jumped: bool = False
+    restarted: bool = False
+
+
+class Timeline:
+    """Turns stamps into rising time; steps that cannot be right are taken from the arrival."""
+
+    def __init__(self) -> None:
+        self._time: int | None = None
+        self._stamp = 0
+        self._arrival = 0
+        self._before_jump: int | None = None
+
+    def advance(self, stamp_ns: int, arrival_ns: int) -> Moment:
+        """The moment of an image.
+
+        Args:
+            stamp_ns: of its header.
+            arrival_ns: when it came, on any clock that never goes back.
+        """
+        if self._time is None:
+            self._time, self._stamp, self._arrival = stamp_ns, stamp_ns, arrival_ns
+            return Moment(stamp_ns)
+        step = stamp_ns - self._stamp
+        waited = min(max(arrival_ns - self._arrival, LEAST_STEP_NS), LARGEST_STEP_NS)
+        jumped = restarted = False
+        if not 0 < step <= LARGEST_STEP_NS:
+            jumped = step != 0
+            old = self._before_jump
+            returned = old is not None and 0 < stamp_ns - old <= LARGEST_STEP_NS
+            restarted = step < 0 and not returned
+            self._before_jump = self._stamp if step > 0 else None
+            step = waited
+        elif self._before_jump is not None and step <= LARGEST_STEP_NS:
+            self._before_jump = None  # two images on the new course: it is the course now
+        self._time += step
+        self._stamp, self._arrival = stamp_ns, arrival_ns
+        return Moment(self._time, jumped, restarted)

@@ -1,0 +1,318 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The tracker as a managed node: wiring only, the work is done elsewhere.
+
+Callbacks store (:mod:`~rgbd_kcf_tracker.ros.intake`); one worker thread decodes, tracks and
+publishes (:mod:`~rgbd_kcf_tracker.ros.processor`). Unconfigured the node only reports diagnostics;
+inactive it holds tracker and topics; active it also listens.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
+from sensor_msgs.msg import CameraInfo, RegionOfInterest
+from std_srvs.srv import Trigger
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
+from rgbd_kcf_tracker.ros.intake import Intake
+from rgbd_kcf_tracker.ros.messages import box_from_roi, intrinsics_from_info
+from rgbd_kcf_tracker.ros.parameters import ParameterServer
+from rgbd_kcf_tracker.ros.processor import Capture, Processor
+from rgbd_kcf_tracker.ros.publishers import TrackPublishers
+from rgbd_kcf_tracker.ros.session import Choice, Session
+from rgbd_kcf_tracker.ros.settings import ALL, RESTART, NodeParameters, parse_box
+from rgbd_kcf_tracker.ros.statistics import Statistics
+from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
+from rgbd_kcf_tracker.ros.worker import Worker
+from rgbd_kcf_tracker.trackers import VARIANTS, TrackState
+
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+POLL_PERIOD_S = 0.025
+DIAGNOSTICS_PERIOD_S = 1.0
+LOG_PERIOD_S = 5.0
+
+
+class TrackerNode(LifecycleNode):
+    """Follows one target in the images of one camera.
+
+    Args:
+        name: of the node.
+        options: passed on to rclpy's node (``parameter_overrides``, ``namespace``, ...).
+    """
+
+    def __init__(self, name: str = 'tracker', **options: Any) -> None:
+        super().__init__(name, **options)
+        self.statistics = Statistics()
+        self._session: Session | None = None
+        self._processor: Processor | None = None
+        self._outputs: TrackPublishers | None = None
+        self._worker: Worker[Capture] | None = None
+        self._intake: Intake | None = None
+        self._inputs: Subscriptions | None = None
+        self._reset_service: Any = None
+        self._logged: dict[str, float] = {}
+        self._parameters_server = ParameterServer(self, self._parameters_changed)
+        for problem in self._parameters_server.problems:
+            self.statistics.error('bad_parameters', problem)
+            self.get_logger().error(problem)
+        self._settings = self._parameters_server.node_parameters()
+        # Diagnostics speak in every lifecycle state, so theirs is a plain publisher.
+        self._diagnostics = Node.create_publisher(self, DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics_timer = self.create_timer(DIAGNOSTICS_PERIOD_S, self._publish_diagnostics)
+        self._poll_timer = self.create_timer(POLL_PERIOD_S, self._poll)
+        self._poll_timer.cancel()
+
+    @property
+    def settings(self) -> NodeParameters:
+        """The node's own parameters as they stand."""
+        return self._settings
+
+    def autostart(self) -> None:
+        """Configure and activate without a lifecycle manager."""
+        if self.trigger_configure() == SUCCESS:
+            self.trigger_activate()
+
+    # --- lifecycle -------------------------------------------------------------------------------
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Make the tracker and the topics of its results."""
+        try:
+            settings = self._settings = self._parameters_server.node_parameters()
+            self._session = Session(
+                settings.variant,
+                self._parameters_server.variant_parameters(settings.variant),
+                partial(self._fault, 'rejected_requests'),
+            )
+            self._outputs = TrackPublishers(self)
+            self._processor = Processor(
+                self._session,
+                self._outputs,
+                self.statistics,
+                lambda: int(self.get_clock().now().nanoseconds),
+                self._fault,
+                color_transport=settings.color_transport,
+                depth_transport=settings.depth_transport,
+            )
+            self._processor.on_restart = self._stamps_restarted
+            self._reset_service = self.create_service(Trigger, '~/reset', self._on_reset)
+            self._choose_box(parse_box(settings.init_box))
+        except Exception as error:  # rclpy would hide it
+            self.get_logger().error(f'cannot configure: {error}')
+            self._take_down()
+            return FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Listen to the camera and start the worker."""
+        if self._processor is None:
+            return FAILURE
+        settings = self._settings
+        try:
+            patient = settings.queue_policy == ALL
+            self._intake = Intake(
+                self.statistics,
+                tolerance_s=settings.pair_tolerance,
+                depth_wait_s=settings.depth_wait,
+                camera_info_wait_s=settings.camera_info_wait,
+                patient=patient,
+            )
+            self._worker = Worker(
+                self._processor, self._worker_failed, keep=settings.queue_size if patient else 1
+            )
+            self._inputs = Subscriptions(
+                self, settings, self._on_color, self._on_depth, self._on_camera_info, self._on_init
+            )
+        except Exception as error:  # rclpy would hide it
+            self.get_logger().error(f'cannot activate: {error}')
+            self._stop_listening()
+            return FAILURE
+        self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop listening; the target and its model are kept."""
+        self._stop_listening()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget everything but the parameters."""
+        self._take_down()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop for good."""
+        self._stop_listening()
+        self._take_down()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Back to unconfigured, from where the node can be configured again."""
+        self._stop_listening()
+        self._take_down()
+        return super().on_error(state)
+
+    def destroy_node(self) -> None:
+        """Stop the worker before the topics go."""
+        self._stop_listening()
+        super().destroy_node()
+
+    def _stop_listening(self) -> None:
+        self._poll_timer.cancel()
+        if self._inputs is not None:
+            self._inputs.destroy()
+            self._inputs = None
+        if self._worker is not None:
+            self._worker.stop()
+            self._worker = None
+        self._intake = None
+
+    def _take_down(self) -> None:
+        if self._outputs is not None:
+            self._outputs.destroy()
+            self._outputs = None
+        if self._reset_service is not None:
+            self.destroy_service(self._reset_service)
+            self._reset_service = None
+        self._session = self._processor = None
+
+    # --- receiving: store only -------------------------------------------------------------------
+
+    def _on_color(self, message: Any) -> None:
+        if self._intake is not None:
+            self._hand_over(self._intake.color(message, time.monotonic_ns()))
+
+    def _on_depth(self, message: Any) -> None:
+        if self._intake is not None:
+            self._hand_over(self._intake.depth(message, time.monotonic_ns()))
+
+    def _on_camera_info(self, message: CameraInfo) -> None:
+        if self._intake is None:
+            return
+        try:
+            intrinsics = intrinsics_from_info(message)
+        except RgbdKcfError as error:
+            self._fault('bad_camera_info', f'camera_info cannot be used: {error}')
+            return
+        self._hand_over(self._intake.camera_info(intrinsics, time.monotonic_ns()))
+
+    def _poll(self) -> None:
+        if self._intake is not None:
+            self._hand_over(self._intake.poll(time.monotonic_ns()))
+
+    def _hand_over(self, captures: list[Capture]) -> None:
+        if self._worker is None or self._intake is None:
+            return
+        for capture in captures:
+            self.statistics.count('dropped', self._worker.submit(capture))
+        # The timer runs only while something waits.
+        if self._intake.idle:
+            self._poll_timer.cancel()
+        elif self._poll_timer.is_canceled():
+            self._poll_timer.reset()
+
+    # --- requests --------------------------------------------------------------------------------
+
+    def _on_init(self, message: RegionOfInterest) -> None:
+        try:
+            box = box_from_roi(message)
+        except RgbdKcfError as error:
+            self._fault('rejected_requests', f'~/init: {error}')
+            return
+        self._choose(lambda _: box)
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        session = self._session
+        response.success = session is not None
+        response.message = 'target dropped' if session else 'the node is not configured'
+        if session is not None:
+            self._in_worker(session.reset)
+        return response
+
+    def _choose(self, choice: Choice) -> None:
+        processor = self._processor
+        if processor is not None:
+            stale = self._settings.stale_after
+            self._in_worker(lambda: processor.choose(choice, stale))
+
+    def _choose_box(self, box: Box | None) -> None:
+        """Start on a box in the next image: the one that a parameter names."""
+        session = self._session
+        if session is not None and box is not None:
+            self._in_worker(lambda: session.choose(lambda _: box))
+
+    def _stamps_restarted(self) -> None:
+        """A bag looped (in the worker's thread)."""
+        if self._session is not None and self._settings.on_time_jump == RESTART:
+            self._session.reset()
+            box = parse_box(self._settings.init_box)
+            if box is not None:
+                self._session.choose(lambda _: box)
+
+    def _parameters_changed(self, names: frozenset[str]) -> None:
+        self._settings = self._parameters_server.node_parameters()
+        if 'init_box' in names:
+            self._choose_box(parse_box(self._settings.init_box))
+        variant = self._settings.variant
+        session = self._session
+        if session is not None and any(n == 'variant' or '.' in n for n in names):
+            parameters = self._parameters_server.variant_parameters(variant)
+            self._in_worker(lambda: session.configure(variant, parameters))
+
+    def _in_worker(self, function: Callable[[], None]) -> None:
+        if self._worker is not None:
+            self._worker.call(function)
+        else:
+            function()
+
+    # --- reporting -------------------------------------------------------------------------------
+
+    def _worker_failed(self, error: Exception) -> None:
+        self._fault('internal_errors', f'internal error: {type(error).__name__}: {error}')
+
+    def _fault(self, kind: str, text: str) -> None:
+        """Count a fault and say it, each kind every few seconds at most."""
+        self.statistics.error(kind, text)
+        now = time.monotonic()
+        if now - self._logged.get(kind, -LOG_PERIOD_S) >= LOG_PERIOD_S:
+            self._logged[kind] = now
+            self.get_logger().warning(text)
+
+    def _publish_diagnostics(self) -> None:
+        snapshot = self.statistics.snapshot()
+        self._diagnostics.publish(
+            diagnostics_message(self.get_clock().now().to_msg(), self._state(), snapshot)
+        )
+
+    def _state(self) -> NodeState:
+        name = self.get_fully_qualified_name()
+        lifecycle = self._state_machine.current_state[1]
+        session, wired = self._session, self._inputs
+        if session is None:
+            return NodeState(name, lifecycle)
+        publishers = dict.fromkeys((COLOR, DEPTH, CAMERA_INFO), 0)
+        if wired is not None and self._intake is not None:
+            publishers = wired.publishers()
+            self._intake.depth_expected = publishers[DEPTH] > 0
+            self._intake.info_expected = publishers[CAMERA_INFO] > 0
+        return NodeState(
+            name=name,
+            lifecycle=lifecycle,
+            variant=session.variant,
+            track=session.track.state if wired is not None else TrackState.IDLE,
+            topic=wired.topic(COLOR) if wired is not None else '',
+            depth_topic=wired.topic(DEPTH) if wired is not None else '',
+            publishers=publishers[COLOR],
+            depth_publishers=publishers[DEPTH],
+            stale_after=self._settings.stale_after,
+            uses_depth=bool(getattr(VARIANTS[session.variant], 'uses_depth', True)),
+        )
