@@ -138,7 +138,7 @@ class Processor:
         return Frame(color, depth, time_ns, capture.intrinsics)
 
     def _depth_wanted(self) -> bool:
-        uses = getattr(VARIANTS[self.session.variant], 'uses_depth', True)
+        uses = VARIANTS[self.session.variant].uses_depth
         return uses or self.session.choosing
 
     def _readable_depth(self, message: Any, color: ColorImage) -> DepthImage | None:

@@ -314,5 +314,5 @@ class TrackerNode(LifecycleNode):
             publishers=publishers[COLOR],
             depth_publishers=publishers[DEPTH],
             stale_after=self._settings.stale_after,
-            uses_depth=bool(getattr(VARIANTS[session.variant], 'uses_depth', True)),
+            uses_depth=VARIANTS[session.variant].uses_depth,
         )

@@ -14,25 +14,40 @@ from rgbd_kcf_tracker.trackers.kcf import KcfParameters, KcfTracker
 from rgbd_kcf_tracker.trackers.track import Track, Tracker, TrackState
 
 __all__ = [
-    'VARIANTS', 'Track', 'TrackState', 'Tracker', 'Variant', 'create_tracker',
+    'VARIANTS',
+    'Track',
+    'TrackState',
+    'Tracker',
+    'Variant',
+    'create_tracker',
     'default_parameters',
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A tracker that users choose by name: its parameters' class and how to make it from them."""
+    """A tracker that users choose by name: its parameters' class and how to make it from them.
+
+    ``uses_depth`` says whether it looks at depth at all: where not, a source need not decode it.
+    """
 
     name: str
     summary: str
     parameters: type[Parameters]
     make: Callable[..., Tracker]
+    uses_depth: bool = True
 
 
 VARIANTS: dict[str, Variant] = {
     v.name: v
     for v in (
-        Variant('kcf', 'colour-only kernelized correlation filter', KcfParameters, KcfTracker),
+        Variant(
+            'kcf',
+            'colour-only kernelized correlation filter',
+            KcfParameters,
+            KcfTracker,
+            uses_depth=False,
+        ),
     )
 }
 DEFAULT_VARIANT = 'kcf'
