@@ -1,0 +1,24 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Simulated Kinect V2 recordings of people and things, with exact ground truth.
+
+>>> from rgbd_kcf_tracker.simulation import simulate
+>>> sequence = simulate('occlusion', seed=3)
+>>> for simulated in sequence:
+...     use(simulated.frame, simulated.visible)  # doctest: +SKIP
+"""
+
+from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence
+from rgbd_kcf_tracker.simulation.simulate import kinect2_intrinsics
+from rgbd_kcf_tracker.simulation.simulate import simulate as simulate
+from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario
+
+__all__ = [
+    'SCENARIOS',
+    'Scenario',
+    'SimulatedFrame',
+    'SimulatedSequence',
+    'kinect2_intrinsics',
+    'simulate',
+]

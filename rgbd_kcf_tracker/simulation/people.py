@@ -1,0 +1,328 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""People: random bodies and clothes, and the pose of a walking, turning, crouching figure.
+
+World frame: x right, y down, z forward, metres; the floor is y = 0. A heading of 0 looks towards -z
+(at the camera), and grows towards +x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.simulation import textures
+from rgbd_kcf_tracker.simulation.solids import Atlas, SolidList, Solids
+
+Vector = npt.NDArray[np.float64]
+HEAD, HAIR, SHIRT, SLEEVE, FOREARM, HAND, THIGH, SHIN, SHOE, NECK, EXTRA = range(11)
+FOREARM_BARE = 0.45
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where a person stands and what they do, at one moment.
+
+    Attributes:
+        x: metres to the right.
+        z: metres forward.
+        heading: radians.
+        phase: of the gait, radians; a stride (two steps) is 2 pi.
+        effort: 0 standing to 1 walking at 1.4 m/s; up to 2 running.
+        crouch: 0 upright to 1 squatting.
+        spread: 0 arms down to 1 arms out to the sides.
+        reach: 0 to 1, right hand held up in front.
+    """
+
+    x: float
+    z: float
+    heading: float = 0.0
+    phase: float = 0.0
+    effort: float = 0.0
+    crouch: float = 0.0
+    spread: float = 0.0
+    reach: float = 0.0
+
+
+@dataclass(frozen=True)
+class Person:
+    """A body and its clothes.
+
+    Attributes:
+        height: metres.
+        build: 0.85 slim to 1.2 broad.
+        atlas: textures by the indices above.
+        skirt: knee-length skirt or coat instead of trousers' outline.
+        long_hair: hair down to the shoulders.
+        hat: 0 none, 1 cap.
+        backpack: wears one.
+    """
+
+    height: float
+    build: float
+    atlas: Atlas
+    skirt: bool = False
+    long_hair: bool = False
+    hat: bool = False
+    backpack: bool = False
+
+    def solids(self, pose: Pose, parts: str = 'all') -> Solids:
+        """The figure in the world frame; ``parts`` is ``'all'``, ``'head'`` or ``'body'``."""
+        return _Figure(self, pose).build(parts)
+
+    def hand(self, pose: Pose) -> Vector:
+        """Where the right hand is, world frame."""
+        return _Figure(self, pose).arm(1)[2]
+
+
+def random_person(
+    rng: np.random.Generator, like: Wardrobe | None = None, child: bool = False
+) -> tuple[Person, Wardrobe]:
+    """A person at random, or another person in (nearly) the same clothes.
+
+    Args:
+        rng: source of randomness.
+        like: clothes to wear.
+        child: 1.0 to 1.4 m tall.
+    """
+    wardrobe = like if like is not None else Wardrobe.random(rng)
+    height = rng.uniform(1.0, 1.4) if child else rng.normal(1.72, 0.09)
+    height = float(np.clip(height, 1.0, 1.98))
+    person = Person(
+        height, float(rng.uniform(0.88, 1.15)), wardrobe.tailor(rng), wardrobe.skirt,
+        wardrobe.long_hair, wardrobe.hat, wardrobe.backpack,
+    )  # fmt: skip
+    return person, wardrobe
+
+
+@dataclass(frozen=True)
+class Wardrobe:
+    """The choice of clothes, from which the textures are made."""
+
+    seed: int
+    shirt: str
+    colors: tuple[textures.Color, textures.Color, textures.Color]
+    trousers: textures.Color
+    trousers_kind: str
+    skin: textures.Color
+    hair: textures.Color
+    shoes: textures.Color
+    bare_arms: bool
+    shorts: bool
+    skirt: bool
+    long_hair: bool
+    hat: bool
+    backpack: bool
+
+    @classmethod
+    def random(cls, rng: np.random.Generator) -> Wardrobe:
+        """Everyday clothes; trousers mostly dark, shirts of any colour."""
+        base = textures.random_color(rng)
+        if rng.uniform() < 0.25:
+            grey = rng.uniform(15, 235)
+            base = (grey, grey, grey)
+        jeans = rng.uniform()
+        if jeans < 0.4:
+            trousers = (rng.uniform(60, 120), rng.uniform(40, 80), rng.uniform(25, 60))
+        elif jeans < 0.75:
+            trousers = textures.random_color(rng, (0.0, 0.3), (0.06, 0.3))
+        else:
+            trousers = textures.random_color(rng, (0.1, 0.6), (0.2, 0.75))
+        return cls(
+            seed=int(rng.integers(1 << 31)),
+            shirt=str(rng.choice(textures.CLOTH_KINDS)),
+            colors=(base, textures.random_color(rng), textures.random_color(rng)),
+            trousers=trousers,
+            trousers_kind=str(rng.choice(['plain', 'plain', 'plain', 'panels', 'pinstripes'])),
+            skin=textures.SKIN[int(rng.integers(len(textures.SKIN)))],
+            hair=textures.HAIR[int(rng.integers(len(textures.HAIR)))],
+            shoes=textures.random_color(rng, (0.0, 0.6), (0.05, 0.9)),
+            bare_arms=bool(rng.uniform() < 0.45),
+            shorts=bool(rng.uniform() < 0.12),
+            skirt=bool(rng.uniform() < 0.12),
+            long_hair=bool(rng.uniform() < 0.35),
+            hat=bool(rng.uniform() < 0.12),
+            backpack=bool(rng.uniform() < 0.12),
+        )
+
+    def nearly(self, rng: np.random.Generator) -> Wardrobe:
+        """The same outfit on somebody else: other skin and hair, a slightly other shade."""
+        shade = rng.uniform(0.9, 1.1)
+
+        def dye(color: textures.Color) -> textures.Color:
+            b, g, r = (float(min(255.0, c * shade)) for c in color)
+            return b, g, r
+
+        first, second, third = self.colors
+        return replace(
+            self,
+            colors=(dye(first), second, third),
+            trousers=dye(self.trousers),
+            skin=textures.SKIN[int(rng.integers(len(textures.SKIN)))],
+            hair=textures.HAIR[int(rng.integers(len(textures.HAIR)))],
+            long_hair=bool(rng.uniform() < 0.35),
+        )
+
+    def tailor(self, rng: np.random.Generator) -> Atlas:
+        """Textures for one wearer; what is printed on the cloth is the same for every wearer."""
+        own = np.random.default_rng(self.seed)
+        shirt = textures.cloth(own, 256, 512, self.shirt, self.colors)
+        plain = 'plain' if self.shirt in ('logo', 'jacket', 'two_tone') else self.shirt
+        sleeve = textures.cloth(own, 128, 160, plain, self.colors)
+        bare = textures.skin(own, 128, 128, self.skin)
+        legs = (self.trousers, self.colors[1], self.colors[2])
+        thigh = textures.cloth(own, 192, 192, self.trousers_kind, legs)
+        shin = textures.cloth(own, 192, 192, self.trousers_kind, legs)
+        if self.shorts or self.skirt:
+            shin = textures.skin(own, 192, 192, self.skin)
+        dots = (self.colors[1], self.colors[2], self.trousers)
+        kind = str(own.choice(['plain', 'checks', 'stripes']))
+        skirt_like = textures.cloth(own, 192, 384, kind, dots)
+        return Atlas([
+            textures.head(rng, 192, 384, self.skin, self.hair),
+            textures.hair(rng, 128, 192, self.hair),
+            shirt,
+            sleeve,
+            bare if self.bare_arms else sleeve,
+            bare,
+            thigh,
+            shin,
+            textures.cloth(own, 64, 96, 'two_tone', (self.shoes, (225, 225, 225), self.shoes)),
+            bare,
+            skirt_like,
+        ])  # fmt: skip
+
+
+class _Figure:
+    """Joint positions of a person in a pose, then the solids around them."""
+
+    def __init__(self, person: Person, pose: Pose) -> None:
+        self.person, self.pose = person, pose
+        sin, cos = math.sin(pose.heading), math.cos(pose.heading)
+        self.forward = np.array([sin, 0.0, -cos])
+        self.side = np.array([cos, 0.0, sin])  # the person's left
+        self.up = np.array([0.0, -1.0, 0.0])
+        h = person.height
+        self.unit = h
+        self.width = h * person.build
+        amplitude = 0.48 * min(pose.effort, 1.5)
+        swing = math.sin(pose.phase)
+        self.legs = []
+        for sign in (-1, 1):
+            thigh = -sign * amplitude * swing + 1.5 * pose.crouch
+            knee = 0.12 * min(pose.effort, 1) + 1.9 * amplitude * max(
+                0.0, math.cos(pose.phase) * float(-sign)
+            )
+            knee += 2.55 * pose.crouch
+            self.legs.append((thigh, thigh - knee))
+        length = 0.245 * h
+        reach = max(length * (math.cos(a) + math.cos(b)) for a, b in self.legs)
+        self.lean = 0.05 * pose.effort + 0.55 * pose.crouch
+        self.trunk = math.cos(self.lean) * self.up + math.sin(self.lean) * self.forward
+        floor = np.array([pose.x, 0.0, pose.z])
+        self.pelvis = floor + self.up * (reach + 0.04 * h) - self.forward * 0.2 * h * pose.crouch
+        self.chest = self.pelvis + self.trunk * 0.29 * h
+        twist = 0.18 * min(pose.effort, 1.2) * swing
+        self.shoulder_side = math.cos(twist) * self.side + math.sin(twist) * self.forward
+
+    def _sagittal(self, angle: float) -> Vector:
+        return -math.cos(angle) * self.up + math.sin(angle) * self.forward
+
+    def arm(self, sign: int) -> tuple[Vector, Vector, Vector, Vector]:
+        """Shoulder, elbow and wrist of the left (-1) or right (1) arm, and its local side axis."""
+        pose, h = self.pose, self.unit
+        shoulder = self.chest + self.shoulder_side * (-sign * 0.105 * self.width)
+        swing = 0.55 * min(pose.effort, 1.6) * math.sin(pose.phase) * sign
+        bend = 0.15 + 0.35 * min(pose.effort, 2.0)
+        reach = pose.reach if sign > 0 else 0.0
+        swing = (1 - reach) * swing + 0.9 * reach + 0.4 * pose.crouch
+        bend = (1 - reach) * bend + 1.2 * reach
+        away = 0.1 + 1.45 * pose.spread
+        out = self.shoulder_side * float(-sign)
+        level = math.cos(away) * -self.up + math.sin(away) * out
+        turn = math.cos(away) if pose.spread > 0 else 1.0
+        upper = math.cos(swing * turn) * level + math.sin(swing * turn) * self.forward
+        fore_angle = swing * turn + bend * (1 - 0.8 * pose.spread)
+        fore = math.cos(fore_angle) * level + math.sin(fore_angle) * self.forward
+        elbow = shoulder + upper * 0.17 * h
+        axis = math.cos(away) * out + math.sin(away) * self.up
+        return shoulder, elbow, elbow + fore * 0.15 * h, axis * float(-sign)
+
+    def build(self, parts: str) -> Solids:
+        """All solids of the figure, or of its head or of the rest."""
+        out = SolidList()
+        if parts in ('all', 'head'):
+            self._head(out)
+        if parts in ('all', 'body'):
+            self._trunk(out)
+            for sign in (-1, 1):
+                self._arm(out, sign)
+                self._leg(out, sign)
+        return out.pack()
+
+    def _head(self, out: SolidList) -> None:
+        h = self.unit
+        grow = 1.0 if h > 1.5 else 1.15
+        head = self.chest + self.trunk * 0.105 * h * grow + self.forward * 0.012 * h
+        down = -0.068 * h * grow * self.up
+        out.ellipsoid(head, down, 0.047 * h * grow, 0.056 * h * grow, HEAD, self.side)
+        back = head + self.up * 0.012 * h - self.forward * 0.014 * h
+        out.ellipsoid(back, down * 0.93, 0.05 * h * grow, 0.051 * h * grow, HAIR, self.side)
+        if self.person.long_hair:
+            out.limb(back, back - self.up * 0.1 * h - self.forward * 0.012 * h, 0.051 * h,
+                     0.058 * h, HAIR, self.side, 0.75)  # fmt: skip
+        if self.person.hat:
+            top = head + self.up * 0.035 * h
+            out.ellipsoid(top, down * 0.62, 0.054 * h, 0.062 * h, EXTRA, self.side)
+            brim = top + self.forward * 0.05 * h
+            out.ellipsoid(brim, -0.008 * h * self.up, 0.045 * h, 0.05 * h, EXTRA, self.side)
+
+    def _trunk(self, out: SolidList) -> None:
+        h, w, side = self.unit, self.width, self.side
+        out.limb(self.chest, self.chest + self.trunk * 0.07 * h, 0.03 * w, 0.027 * w, NECK, side)
+        top = self.chest + self.trunk * 0.03 * h
+        out.limb(top, self.pelvis, 0.098 * w, 0.086 * w, SHIRT, self.shoulder_side, 0.62)
+        out.ellipsoid(self.chest - self.trunk * 0.02 * h, -self.trunk * 0.062 * h, 0.118 * w,
+                      0.062 * w, SLEEVE, self.shoulder_side)  # fmt: skip
+        hip = -self.trunk * 0.058 * h
+        out.ellipsoid(self.pelvis - self.trunk * 0.005 * h, hip, 0.092 * w, 0.066 * w, THIGH, side)
+        if self.person.skirt:
+            low = self.pelvis + self._sagittal(self.pose.crouch) * 0.24 * h
+            out.limb(self.pelvis, low, 0.088 * w, 0.12 * w, EXTRA, side, 0.75)
+        if self.person.backpack:
+            pack = self.chest - self.trunk * 0.09 * h - self.forward * 0.085 * w
+            out.ellipsoid(pack, -self.trunk * 0.13 * h, 0.085 * w, 0.055 * w, EXTRA, side)
+
+    def _arm(self, out: SolidList, sign: int) -> None:
+        w = self.width
+        shoulder, elbow, wrist, axis = self.arm(sign)
+        fore = wrist - elbow
+        fore /= np.linalg.norm(fore)
+        ball = 0.034 * w
+        out.ellipsoid(shoulder, (elbow - shoulder) * 0.2, ball, ball, SLEEVE, axis)
+        out.limb(shoulder, elbow, 0.032 * w, 0.025 * w, SLEEVE, axis)
+        out.ellipsoid(elbow, fore * 0.025 * w, 0.025 * w, 0.025 * w, FOREARM, axis)
+        out.limb(elbow, wrist, 0.025 * w, 0.018 * w, FOREARM, axis)
+        out.ellipsoid(wrist + fore * 0.035 * self.unit, fore * 0.048 * self.unit, 0.022 * w,
+                      0.015 * w, HAND, axis)  # fmt: skip
+
+    def _leg(self, out: SolidList, sign: int) -> None:
+        h, w, side = self.unit, self.width, self.side
+        thigh_angle, shin_angle = self.legs[0 if sign < 0 else 1]
+        hip = self.pelvis + side * (-sign * 0.046 * w)
+        knee = hip + self._sagittal(thigh_angle) * 0.245 * h
+        shin = self._sagittal(shin_angle)
+        ankle = knee + shin * 0.245 * h
+        out.limb(hip, knee, 0.05 * w, 0.036 * w, THIGH, side)
+        out.ellipsoid(knee, shin * 0.036 * w, 0.036 * w, 0.037 * w, SHIN, side)
+        out.limb(knee, ankle, 0.035 * w, 0.024 * w, SHIN, side)
+        pitch = 0.5 * shin_angle if self.pose.crouch < 0.3 else 0.0
+        toe = math.cos(pitch) * self.forward + math.sin(pitch) * self.up
+        foot = ankle - self.up * 0.012 * h + toe * 0.045 * h
+        sole = np.cross(toe, side)
+        sole = sole if sole[1] > 0 else -sole
+        out.ellipsoid(foot, sole * 0.026 * h, 0.028 * w, 0.08 * h, SHOE, side)

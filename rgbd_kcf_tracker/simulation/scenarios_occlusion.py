@@ -1,0 +1,225 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenarios in which the target is hidden for a while: behind things and people, or out of view."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rgbd_kcf_tracker.simulation.room import chair
+from rgbd_kcf_tracker.simulation.scene import Actor, Scene
+from rgbd_kcf_tracker.simulation.stage import Point, Stage, route, scenario
+
+
+def _behind(
+    stage: Stage, *, way_shares: list[float], width: float, at: float = 0.0,
+    speed: tuple[float, float] = (0.8, 1.3), height: tuple[float, float] = (1.6, 2.1),
+) -> tuple[list[Point], float, Scene]:  # fmt: skip
+    """A cupboard before the path; the points of the path, its speed, and a scene without actors."""
+    near, far = stage.uniform(1.7, 2.3), stage.uniform(2.9, 3.8)
+    room = stage.room()
+    stage.occluder(room, stage.x(at, near), near, width, stage.uniform(*height))
+    side = stage.sign()
+    points: list[Point] = [(stage.x(at + s * side, far), far) for s in way_shares]
+    return points, stage.uniform(*speed), stage.scene([], 1.0, room=room)
+
+
+@scenario('the target walks behind a cupboard, shelf or pile of boxes and comes out again')
+def occlusion(stage: Stage) -> Scene:
+    """The thesis's full occlusion."""
+    points, speed, scene = _behind(
+        stage, way_shares=[-0.75, 0.75, 0.75, -0.7], width=stage.uniform(0.8, 1.3),
+        at=stage.uniform(-0.15, 0.15),
+    )  # fmt: skip
+    way = route(points, speed)
+    scene.actors = [stage.walk(stage.person(), way)]
+    scene.duration_s = min(way[-1][0] + 0.5, 9.0)
+    return scene
+
+
+@scenario('the target goes behind a box and turns back: it comes out where it went in')
+def turn_back(stage: Stage) -> Scene:
+    """Hidden for a second or so, then out on the same side."""
+    points, speed, scene = _behind(stage, way_shares=[-0.75, 0.0, 0.0, 0.0, -0.8],
+                                   width=stage.uniform(0.9, 1.3))  # fmt: skip
+    way = route(points, speed)
+    scene.actors = [stage.walk(stage.person(), way)]
+    scene.duration_s = way[-1][0] + 0.8
+    return scene
+
+
+@scenario('the target stands behind a box for several seconds')
+def long_occlusion(stage: Stage) -> Scene:
+    """Hidden for 3 to 5 seconds, out on either side."""
+    out = 0.8 * stage.sign()
+    points, speed, scene = _behind(stage, way_shares=[-0.75, 0.0, out],
+                                   width=stage.uniform(0.9, 1.3))  # fmt: skip
+    there = route(points[:2], speed)
+    pause = stage.uniform(2.5, 4.0)
+    back = route(points[1:], speed, there[-1][0] + pause)
+    scene.actors = [stage.walk(stage.person(), there + back)]
+    scene.duration_s = back[-1][0] + 1.5
+    return scene
+
+
+@scenario('the target is hidden a few frames after the start')
+def early_occlusion(stage: Stage) -> Scene:
+    """A fifth to half a second after the given box."""
+    far, near, side = stage.uniform(2.8, 3.4), stage.uniform(1.5, 2.0), stage.sign()
+    x = stage.x(stage.uniform(-0.3, 0.3), far)
+    meet = x * near / far
+    speed = stage.uniform(1.3, 1.7)
+    begin = meet - side * (speed * stage.uniform(0.25, 0.5) + 0.55 * near / far + 0.3)
+    cast: list[Actor] = [
+        stage.walk(stage.person(), [(0, x, far), (3, x, far), (5, x + 0.8 * side, far)],
+                   heading=[(0, 0.0), (3, 0.2), (3.4, 1.5 * side)]),
+        stage.walk(stage.person(), route([(begin, near), (meet, near), (meet, near),
+                                          (meet + side * 3.5, near)], speed)),
+    ]  # fmt: skip
+    return stage.scene(cast, 5.5)
+
+
+@scenario('the target and another person walk past each other')
+def crossing(stage: Stage) -> Scene:
+    """The thesis's moving target and moving occluder."""
+    far, near, side = stage.uniform(2.7, 3.6), stage.uniform(1.5, 2.1), stage.sign()
+    way = route([(stage.x(side * s, far), far) for s in (-0.7, 0.7, 0.7, -0.6)],
+                stage.uniform(0.7, 1.1))  # fmt: skip
+    other = route([(stage.x(side * s, near), near) for s in (1.4, -1.4, -1.4, 1.4)],
+                  stage.uniform(0.7, 1.2), stage.uniform(0.0, 0.8))  # fmt: skip
+    cast: list[Actor] = [stage.walk(stage.person(), way), stage.walk(stage.person(), other)]
+    return stage.scene(cast, min(way[-1][0] + 0.5, 8.0))
+
+
+@scenario('somebody passes before a standing target, and back')
+def passer_by(stage: Stage) -> Scene:
+    """The thesis's standing target and moving occluder."""
+    far, near, side = stage.uniform(2.6, 3.6), stage.uniform(1.3, 2.0), stage.sign()
+    x = stage.x(stage.uniform(-0.3, 0.3), far)
+    turn = stage.uniform(-1, 1)
+    other: list[Point] = [(stage.x(side * s, near), near) for s in (-1.4, 1.4, 1.4, -1.4)]
+    way = route(other, stage.uniform(0.7, 1.2), stage.uniform(-0.2, 0.6))
+    channels = {'spread': [(0.0, 0.0), (2.5, 0.0), (3.0, 0.35), (4.0, 0.0)]}
+    cast: list[Actor] = [
+        stage.walk(stage.person(), [(0, x, far)], heading=[(0, turn), (3, turn), (4, -turn)],
+                   channels=channels),
+        stage.walk(stage.person(), way),
+    ]  # fmt: skip
+    return stage.scene(cast, min(way[-1][0], 8.0))
+
+
+@scenario('a box on wheels is pushed before the standing target and stays for a while')
+def behind_box(stage: Stage) -> Scene:
+    """The thesis's occlusion by a box; who pushes it walks behind it."""
+    far, near, side = stage.uniform(2.6, 3.4), stage.uniform(1.5, 2.0), stage.sign()
+    x = stage.x(stage.uniform(-0.25, 0.25), far)
+    meet = x * near / far
+    wide, speed = stage.uniform(0.9, 1.2), stage.uniform(0.8, 1.2)
+    points: list[Point] = [(meet - 2.8 * side, near), (meet, near), (meet, near), (meet, near),
+                           (meet + side * 3.2, near)]  # fmt: skip
+    way = route(points, speed)
+    box = stage.pushed_box(way, (wide, stage.uniform(1.6, 1.9), 0.4),
+                           str(stage.rng.choice(['cupboard', 'cardboard', 'wood'])))  # fmt: skip
+    pusher = [(t, px - side * (wide / 2 + 0.4), pz) for t, px, pz in way]
+    cast: list[Actor] = [
+        stage.walk(stage.person(), [(0, x, far)], heading=[(0, stage.uniform(-1, 1))]),
+        box,
+        stage.walk(stage.person(), pusher, channels={'reach': [(0, 0.8)]}),
+    ]
+    return stage.scene(cast, min(way[-1][0], 8.0))
+
+
+@scenario('the target ducks behind an armchair close to the camera')
+def behind_chair(stage: Stage) -> Scene:
+    """The thesis's occlusion by a chair: partly while standing behind it, fully when ducking."""
+    stage.camera_height, stage.pitch = stage.uniform(0.85, 1.0), 0.02
+    near, far, side = stage.uniform(1.3, 1.6), stage.uniform(2.5, 3.0), stage.sign()
+    room = stage.room()
+    room.faces += stage.box_faces((0, near), (0.85, 0.55, 0.7), 'wood', turn=0.0)
+    room.faces += stage.box_faces((0, near + 0.3), (0.85, stage.uniform(1.05, 1.15), 0.15), 'wood')
+    if stage.rng.uniform() < 0.6:
+        spot = np.array([stage.x(0.6 * side, near + 0.4), 0, near + 0.4])
+        room.faces += chair(stage.rng, spot, stage.uniform(0, 6.28))
+    points = route([(stage.x(-0.6 * side, far), far), (0.0, far)], stage.uniform(0.8, 1.1))
+    arrive = points[-1][0]
+    hide = stage.uniform(1.0, 2.0)
+    leave = route([(0.0, far), (stage.x(0.65 * side, far), far)], 0.9, arrive + hide + 1.2)
+    crouch = [(0, 0.0), (arrive, 0.0), (arrive + 0.6, 1.0), (arrive + 0.6 + hide, 1.0),
+              (arrive + 1.2 + hide, 0.0)]  # fmt: skip
+    actor = stage.walk(stage.person(), points + leave, channels={'crouch': crouch})
+    return stage.scene([actor], leave[-1][0] + 0.6, room=room)
+
+
+@scenario('the target steps behind a standing person and comes out on the other side')
+def behind_person(stage: Stage) -> Scene:
+    """The thesis's occlusion by a person who stands still."""
+    near, far, side = stage.uniform(1.5, 1.9), stage.uniform(2.8, 3.4), stage.sign()
+    at = stage.uniform(-0.15, 0.15)
+    points: list[Point] = [(stage.x(at + s * side, far), far) for s in (-0.65, 0, 0, 0.65)]
+    way = route(points, stage.uniform(0.7, 1.0))
+    cast: list[Actor] = [
+        stage.walk(stage.person(), way),
+        stage.walk(stage.person(), [(0, stage.x(at, near), near)],
+                   heading=[(0, stage.uniform(-3, 3))]),
+    ]  # fmt: skip
+    return stage.scene(cast, way[-1][0] + 0.8)
+
+
+@scenario('somebody walks so close before the target that the two touch')
+def touching(stage: Stage) -> Scene:
+    """A gap of 10 to 30 cm in depth: the surfaces join."""
+    z, side = stage.uniform(2.3, 3.2), stage.sign()
+    x = stage.x(stage.uniform(-0.2, 0.2), z)
+    near = z - stage.uniform(0.42, 0.55)
+    pause = stage.uniform(0.3, 1.0)
+    there = route([(x - side * 1.9, near), (x - side * 0.02, near)], stage.uniform(0.7, 1.0), 0.4)
+    back = route([(x - side * 0.02, near), (x + side * 2.2, near)], 0.9, there[-1][0] + pause)
+    cast: list[Actor] = [
+        stage.walk(stage.person(), [(0, x, z)], heading=[(0, stage.uniform(-0.8, 0.8))]),
+        stage.walk(stage.person(), there + back),
+    ]
+    return stage.scene(cast, min(back[-1][0] + 0.4, 8.0))
+
+
+@scenario('the target leaves the view and returns through the same edge')
+def out_of_view(stage: Stage) -> Scene:
+    """The thesis's out of view."""
+    z, side = stage.uniform(2.2, 3.2), stage.sign()
+    points: list[Point] = [(stage.x(side * s, z), z) for s in (-0.3, 1.4, 1.4, 1.4, -0.4)]
+    way = route(points, stage.uniform(0.9, 1.3))
+    return stage.scene([stage.walk(stage.person(), way)], way[-1][0] + 0.5)
+
+
+@scenario('the target leaves the view and returns through the other edge')
+def other_edge(stage: Stage) -> Scene:
+    """It passes behind the camera, unseen."""
+    z, side = stage.uniform(2.2, 3.0), stage.sign()
+    speed = stage.uniform(1.0, 1.4)
+    first = route([(stage.x(side * s, z), z) for s in (-0.3, 1.5)], speed)
+    t = first[-1][0]
+    far = stage.uniform(2.0, 3.4)
+    unseen = [(t + 0.3, stage.x(side * 1.6, z), -1.0), (t + 0.8, stage.x(-side * 1.6, far), -1.0)]
+    last = route([(stage.x(side * s, far), far) for s in (-1.5, 0.3, 0.5)], speed, t + 1.1)
+    return stage.scene([stage.walk(stage.person(), first + unseen + last)], last[-1][0] + 0.5)
+
+
+@scenario('the target goes behind a box while somebody in the same clothes walks out')
+def decoy(stage: Stage) -> Scene:
+    """The lookalike comes out where the target is expected; the target follows later."""
+    points, speed, scene = _behind(stage, way_shares=[-0.7, 0.0, 0.7],
+                                   width=stage.uniform(1.0, 1.4))  # fmt: skip
+    there = route(points[:2], speed)
+    t = there[-1][0]
+    wait = stage.uniform(1.2, 2.0)
+    back = route(points[1:], speed, t + wait)
+    target = stage.person()
+    far = points[1][1] + 0.5
+    exit_x = points[2][0] * far / points[2][1]
+    other: list[Point] = [(points[1][0], far), (exit_x * 2.2, far)]
+    cast: list[Actor] = [
+        stage.walk(target, there + back),
+        stage.walk(stage.person(stage.cast[0].nearly(stage.rng)), route(other, speed, t)),
+    ]
+    scene.actors, scene.duration_s = cast, back[-1][0] + 0.8
+    return scene

@@ -1,0 +1,64 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Make a simulated sequence by the name of its scenario."""
+
+from __future__ import annotations
+
+import math
+import zlib
+
+import numpy as np
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.simulation import (  # noqa: F401  (importing them registers them)
+    scenarios_basic,
+    scenarios_occlusion,
+)
+from rgbd_kcf_tracker.simulation.scene import SimulatedSequence
+from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Stage
+
+QHD = (960, 540)
+
+
+def kinect2_intrinsics(size: tuple[int, int]) -> Intrinsics:
+    """A Kinect V2's colour camera at a width: 1081 pixels of focal length at 1920 columns."""
+    focal = 540.68 * size[0] / 960
+    return Intrinsics(focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2)
+
+
+def simulate(
+    scenario: str, seed: int = 0, rate_hz: float = 30.0, duration_s: float | None = None,
+    size: tuple[int, int] = QHD,
+) -> SimulatedSequence:  # fmt: skip
+    """Set up a scene; its frames are rendered when asked for.
+
+    Args:
+        scenario: a name in `SCENARIOS`.
+        seed: of everything random; the same seed shows the same world at any rate.
+        rate_hz: frames per second.
+        duration_s: seconds to record; by default the scene's own length. Past its end the actors
+            stand still.
+        size: width and height of the picture in pixels.
+
+    Raises:
+        ParameterError: where a name is unknown or a number out of range.
+    """
+    if scenario not in SCENARIOS:
+        raise ParameterError(
+            f'unknown scenario {scenario!r}: choose one of {", ".join(sorted(SCENARIOS))}'
+        )
+    if seed < 0:
+        raise ParameterError(f'seed is {seed}: give a number of 0 or above')
+    if not (math.isfinite(rate_hz) and 0.1 <= rate_hz <= 1000):
+        raise ParameterError(f'rate is {rate_hz:g} Hz: give 0.1 to 1000')
+    if duration_s is not None and not (math.isfinite(duration_s) and 0 < duration_s <= 3600):
+        raise ParameterError(f'duration is {duration_s:g} s: give above 0 and at most 3600')
+    if not (64 <= size[0] <= 4096 and 48 <= size[1] <= 4096):
+        raise ParameterError(f'size is {size[0]}x{size[1]}: give 64x48 to 4096x4096')
+    camera = kinect2_intrinsics(size)
+    rng = np.random.default_rng([seed, zlib.crc32(scenario.encode())])
+    scene = SCENARIOS[scenario].build(Stage(rng, camera, size))
+    length = scene.duration_s if duration_s is None else duration_s
+    return SimulatedSequence(scene, scenario, seed, rate_hz, length, size, camera)

@@ -1,0 +1,359 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Procedural textures: cloth, skin, walls, floors, furniture. All ``(h, w, 3)`` uint8 BGR."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Texture = npt.NDArray[np.uint8]
+Color = tuple[float, float, float]
+
+SKIN: tuple[Color, ...] = (
+    (150, 180, 224), (125, 160, 212), (100, 138, 196), (75, 108, 165), (52, 78, 122), (38, 55, 90),
+)  # fmt: skip
+HAIR: tuple[Color, ...] = (
+    (22, 22, 26), (28, 38, 58), (40, 62, 96), (70, 120, 170), (110, 170, 205), (150, 150, 155),
+    (30, 50, 110),
+)  # fmt: skip
+
+
+def smooth_noise(rng: np.random.Generator, h: int, w: int, cells: float) -> npt.NDArray[np.float32]:
+    """Smooth noise in about [-1, 1] with ``cells`` bumps along the longer side."""
+    step = max(h, w) / max(cells, 1.0)
+    coarse = rng.uniform(-1, 1, (int(h / step) + 3, int(w / step) + 3)).astype(np.float32)
+    fine = cv2.resize(coarse, (w, h), interpolation=cv2.INTER_CUBIC)
+    return np.asarray(fine, np.float32)
+
+
+def random_color(
+    rng: np.random.Generator, saturation: tuple[float, float] = (0.1, 0.9),
+    value: tuple[float, float] = (0.15, 0.9),
+) -> Color:  # fmt: skip
+    """A random BGR colour within bounds of saturation and brightness."""
+    r, g, b = colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(*saturation), rng.uniform(*value))
+    return b * 255, g * 255, r * 255
+
+
+def _flat(h: int, w: int, color: Color) -> npt.NDArray[np.float32]:
+    return np.full((h, w, 3), color, np.float32)
+
+
+def _finish(image: npt.NDArray[np.float32]) -> Texture:
+    return np.clip(image, 0, 255).astype(np.uint8)
+
+
+def _shaded(
+    rng: np.random.Generator, image: npt.NDArray[np.float32], broad: float, grain: float
+) -> Texture:
+    """Multiply in broad folds or stains and a fine grain."""
+    h, w = image.shape[:2]
+    gain = 1 + broad * smooth_noise(rng, h, w, 6) + broad * 0.6 * smooth_noise(rng, h, w, 17)
+    gain += grain * rng.standard_normal((h, w), dtype=np.float32)
+    return _finish(image * gain[..., None])
+
+
+def cloth(
+    rng: np.random.Generator, h: int, w: int, kind: str, colors: tuple[Color, Color, Color]
+) -> Texture:
+    """A garment's cloth wrapped once around a limb or torso.
+
+    Args:
+        rng: source of the details.
+        h: rows, from the top of the garment to its lower end.
+        w: columns, once around; the front is in the middle.
+        kind: one of `CLOTH_KINDS`.
+        colors: ground, pattern and accent colour.
+    """
+    base, second, third = colors
+    image = _flat(h, w, base)
+    rows, cols = np.mgrid[0:h, 0:w].astype(np.float32)
+    if kind == 'stripes':
+        period = h / rng.integers(4, 12)
+        image[(rows % period) < period * rng.uniform(0.25, 0.6)] = second
+    elif kind == 'pinstripes':
+        period = w / rng.integers(14, 40)
+        image[(cols % period) < period * rng.uniform(0.2, 0.5)] = second
+    elif kind == 'checks':
+        period_x, period_y = w / rng.integers(8, 20), h / rng.integers(4, 10)
+        across = (cols % period_x) < period_x * 0.4
+        down = (rows % period_y) < period_y * 0.4
+        image[across] = 0.5 * image[across] + 0.5 * np.array(second, np.float32)
+        image[down] = 0.5 * image[down] + 0.5 * np.array(third, np.float32)
+    elif kind == 'dots':
+        pitch = max(8.0, w / rng.integers(12, 26))
+        dx = (cols + (rows // pitch % 2) * pitch / 2) % pitch - pitch / 2
+        dy = rows % pitch - pitch / 2
+        image[dx * dx + dy * dy < (pitch * rng.uniform(0.2, 0.33)) ** 2] = second
+    elif kind == 'two_tone':
+        image[int(h * rng.uniform(0.35, 0.65)) :] = second
+    elif kind == 'camouflage':
+        field = smooth_noise(rng, h, w, 14)
+        image[field > 0.15] = second
+        image[field < -0.3] = third
+    elif kind == 'panels':
+        side = np.abs(cols / w - 0.5)
+        image[(side > 0.2) & (side < 0.3)] = second
+    elif kind == 'jacket':
+        image[np.abs(cols / w - 0.5) < rng.uniform(0.02, 0.07)] = second
+        image[: int(h * 0.08)] = third
+    if kind in ('logo', 'jacket') or rng.uniform() < 0.15:
+        _print_logo(rng, image, second, third)
+    return _shaded(rng, image, broad=0.10, grain=0.045)
+
+
+CLOTH_KINDS = (
+    'plain', 'logo', 'stripes', 'pinstripes', 'checks', 'dots', 'two_tone', 'camouflage', 'panels',
+    'jacket',
+)  # fmt: skip
+
+
+def _print_logo(
+    rng: np.random.Generator, image: npt.NDArray[np.float32], first: Color, second: Color
+) -> None:
+    """Print a shape or a line of letters on the front, and often a bigger one on the back."""
+    h, w = image.shape[:2]
+    for centre, likely in ((0.5, 1.0), (0.0, 0.5)):
+        if rng.uniform() > likely:
+            continue
+        patch = np.ascontiguousarray(np.roll(image, int((0.5 - centre) * w), axis=1))
+        x, y, r = w // 2, int(h * rng.uniform(0.25, 0.5)), int(w * rng.uniform(0.04, 0.09))
+        style = rng.integers(4)
+        if style == 0:
+            cv2.circle(patch, (x, y), r, first, -1, cv2.LINE_AA)
+            cv2.circle(patch, (x, y), r // 2, second, -1, cv2.LINE_AA)
+        elif style == 1:
+            cv2.rectangle(patch, (x - 2 * r, y - r // 2), (x + 2 * r, y + r // 2), first, -1)
+        elif style == 2:
+            letters = ''.join(
+                chr(65 + int(k)) for k in rng.integers(0, 26, int(rng.integers(1, 5)))
+            )
+            scale = r / 14
+            width = cv2.getTextSize(letters, cv2.FONT_HERSHEY_DUPLEX, scale, 3)[0][0]
+            cv2.putText(
+                patch, letters, (x - width // 2, y + r), cv2.FONT_HERSHEY_DUPLEX, scale, first, 3,
+                cv2.LINE_AA,
+            )  # fmt: skip
+        else:
+            star = [
+                (x + r * f * np.sin(a), y - r * f * np.cos(a))
+                for a, f in zip(np.arange(10) * np.pi / 5, [1.2, 0.5] * 5, strict=True)
+            ]
+            cv2.fillPoly(patch, [np.array(star, np.int32)], first, cv2.LINE_AA)
+        image[:] = np.roll(patch, -int((0.5 - centre) * w), axis=1)
+
+
+def skin(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
+    """Bare skin."""
+    return _shaded(rng, _flat(h, w, color), broad=0.06, grain=0.02)
+
+
+def hair(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
+    """Hair: strands that run down."""
+    strands = cv2.GaussianBlur(
+        rng.standard_normal((h, w), dtype=np.float32), (0, 0), sigmaX=0.8, sigmaY=h / 10
+    )
+    strands /= float(strands.std()) + 1e-6
+    return _finish(_flat(h, w, color) * (1 + 0.18 * strands[..., None]))
+
+
+def head(rng: np.random.Generator, h: int, w: int, skin_color: Color, hair_color: Color) -> Texture:
+    """A head unrolled from crown to chin, the face in the middle."""
+    image = skin(rng, h, w, skin_color)
+    tone = np.array(skin_color, np.float64)
+    x = w // 2
+    eye_y, eye_dx = int(h * 0.47), int(w * 0.055)
+    for side in (-1, 1):
+        eye = (x + side * eye_dx, eye_y)
+        cv2.ellipse(image, eye, (w // 40, h // 40), 0, 0, 360, (225, 230, 235), -1, cv2.LINE_AA)
+        cv2.circle(image, eye, max(1, w // 70), (40, 45, 50), -1, cv2.LINE_AA)
+        cv2.line(
+            image, (eye[0] - w // 34, eye_y - h // 18), (eye[0] + w // 34, eye_y - h // 17),
+            tuple(float(c) * 0.8 for c in hair_color), max(2, h // 50), cv2.LINE_AA,
+        )  # fmt: skip
+    shade = tuple(float(c) for c in tone * 0.72)
+    cv2.line(image, (x, eye_y + h // 30), (x, int(h * 0.62)), shade, max(2, w // 70), cv2.LINE_AA)
+    cv2.ellipse(image, (x, int(h * 0.63)), (w // 36, h // 50), 0, 0, 360, shade, -1, cv2.LINE_AA)
+    lips = (float(tone[0] * 0.65), float(tone[1] * 0.55), float(tone[2] * 0.85))
+    cv2.ellipse(image, (x, int(h * 0.73)), (w // 24, h // 55), 0, 0, 360, lips, -1, cv2.LINE_AA)
+    extras = rng.uniform(size=3)
+    if extras[0] < 0.25:  # beard
+        rows, cols = np.mgrid[0:h, 0:w]
+        beard = (rows > h * 0.68) & (np.abs(cols - x) < w * 0.19)
+        beard &= ~((np.abs(rows - h * 0.73) < h * 0.02) & (np.abs(cols - x) < w * 0.045))
+        image[beard] = hair(rng, h, w, hair_color)[beard]
+    if extras[1] < 0.3:  # glasses
+        for side in (-1, 1):
+            cv2.ellipse(
+                image, (x + side * eye_dx, eye_y), (w // 26, h // 20), 0, 0, 360, (30, 30, 30), 2
+            )
+    rows, cols = np.mgrid[0:h, 0:w].astype(np.float32)
+    side_angle = np.abs(cols / w - 0.5)
+    line = 0.27 + 0.05 * np.cos(cols / w * 40) + 0.9 * np.clip(side_angle - 0.17, 0, 1) * 4
+    if extras[2] > 0.06:  # else bald
+        hairy = rows / h < np.clip(line, 0, 0.8)
+        image[hairy] = hair(rng, h, w, hair_color)[hairy]
+    return image
+
+
+def paint(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
+    """A painted surface with stains and roughness."""
+    return _shaded(rng, _flat(h, w, color), broad=0.05, grain=0.015)
+
+
+def wallpaper(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """A wall: paint, stripes, bricks or panels."""
+    color = random_color(rng, (0.02, 0.35), (0.45, 0.9))
+    image = _flat(h, w, color)
+    kind = rng.choice(['paint', 'paint', 'stripes', 'bricks', 'panels', 'wainscot'])
+    rows, cols = np.mgrid[0:h, 0:w].astype(np.float32)
+    other = tuple(float(c * rng.uniform(0.75, 1.15)) for c in color)
+    if kind == 'stripes':
+        period = w / rng.integers(12, 50)
+        image[(cols % period) < period * 0.5] = other
+    elif kind == 'bricks':
+        bh, bw = h / rng.integers(16, 30), w / rng.integers(16, 34)
+        row = np.floor(rows / bh)
+        col = np.floor(cols / bw + 0.5 * (row % 2))
+        tint = rng.uniform(0.8, 1.12, (64, 64)).astype(np.float32)
+        image = image * tint[row.astype(int) % 64, col.astype(int) % 64][..., None]
+        mortar = (rows % bh < 3) | ((cols + 0.5 * bw * (row % 2)) % bw < 3)
+        image[mortar] = 170
+    elif kind == 'panels':
+        period = w / rng.integers(5, 10)
+        image[(cols % period) < 4] = np.array(color, np.float32) * 0.6
+    elif kind == 'wainscot':
+        image[int(h * 0.6) :] = other
+        image[int(h * 0.6) : int(h * 0.62)] = np.array(color, np.float32) * 0.5
+    image[int(h * 0.965) :] = random_color(rng, (0.1, 0.4), (0.2, 0.8))
+    return _shaded(rng, image, broad=0.05, grain=0.02)
+
+
+def floor(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """A floor: planks, tiles or carpet."""
+    kind = rng.choice(['planks', 'tiles', 'carpet', 'concrete'])
+    rows, cols = np.mgrid[0:h, 0:w].astype(np.float32)
+    if kind == 'planks':
+        color = (rng.uniform(40, 110), rng.uniform(80, 140), rng.uniform(120, 190))
+        count = rng.integers(20, 40)
+        ph, pw = h / count, w / rng.integers(4, 9)
+        row = np.floor(rows / ph)
+        col = np.floor(cols / pw + 0.37 * row)
+        tint = rng.uniform(0.75, 1.15, (64, 64)).astype(np.float32)
+        image = _flat(h, w, color) * tint[row.astype(int) % 64, col.astype(int) % 64][..., None]
+        grain = cv2.resize(rng.standard_normal((h, max(1, w // 24)), dtype=np.float32), (w, h))
+        image *= 1 + 0.07 * grain[..., None]
+        image[rows % ph < 1.5] *= 0.6
+    elif kind == 'tiles':
+        color = random_color(rng, (0.02, 0.3), (0.45, 0.85))
+        image = _flat(h, w, color)
+        size = w / rng.integers(14, 30)
+        odd = (np.floor(rows / size) + np.floor(cols / size)) % 2 > 0
+        image[odd] *= rng.uniform(0.55, 1.0)
+        image[(rows % size < 2) | (cols % size < 2)] *= 0.65
+    elif kind == 'carpet':
+        image = _flat(h, w, random_color(rng, (0.1, 0.6), (0.25, 0.6)))
+        image *= 1 + 0.12 * rng.standard_normal((h, w, 1), dtype=np.float32)
+    else:
+        image = _flat(h, w, random_color(rng, (0.0, 0.1), (0.35, 0.7)))
+    return _shaded(rng, image, broad=0.08, grain=0.03)
+
+
+def wood(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """Wooden furniture with vertical grain."""
+    color = (rng.uniform(30, 130), rng.uniform(60, 160), rng.uniform(90, 200))
+    grain = cv2.resize(rng.standard_normal((max(1, h // 16), w), dtype=np.float32), (w, h))
+    return _shaded(rng, _flat(h, w, color) * (1 + 0.08 * grain[..., None]), 0.06, 0.02)
+
+
+def cardboard(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """A box with tape and print."""
+    color = (rng.uniform(70, 110), rng.uniform(120, 150), rng.uniform(165, 195))
+    image = _flat(h, w, color)
+    image[:, int(w * 0.45) : int(w * 0.55)] *= 1.15
+    if rng.uniform() < 0.7:
+        x, y = int(w * rng.uniform(0.05, 0.5)), int(h * rng.uniform(0.1, 0.6))
+        cv2.rectangle(image, (x, y), (x + w // 3, y + h // 5), (60, 60, 70), 3)
+        cv2.putText(image, 'FRAGILE', (x + 4, y + h // 7), cv2.FONT_HERSHEY_DUPLEX, w / 400,
+                    (50, 50, 60), 2)  # fmt: skip
+    return _shaded(rng, image, broad=0.06, grain=0.03)
+
+
+def cabinet(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """Doors or drawers with handles."""
+    image = wood(rng, h, w) if rng.uniform() < 0.6 else paint(
+        rng, h, w, random_color(rng, (0.0, 0.4), (0.3, 0.9))
+    )  # fmt: skip
+    rows, cols = int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    for r in range(rows):
+        for c in range(cols):
+            x0, y0 = c * w // cols, r * h // rows
+            x1, y1 = (c + 1) * w // cols - 1, (r + 1) * h // rows - 1
+            cv2.rectangle(image, (x0 + 3, y0 + 3), (x1 - 3, y1 - 3), (40, 45, 50), 2)
+            cx, cy = (x0 + x1) // 2, (y0 + y1) // 2
+            cv2.line(image, (cx - w // 20, cy), (cx + w // 20, cy), (60, 60, 60), 4)
+    return image
+
+
+def bookshelf(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """Rows of books."""
+    image = wood(rng, h, w)
+    shelves = int(rng.integers(3, 6))
+    for s in range(shelves):
+        top, bottom = s * h // shelves + 8, (s + 1) * h // shelves - 6
+        image[top:bottom, 8 : w - 8] = 30
+        x = 10
+        while x < w - 24:
+            width = int(rng.integers(7, 22))
+            tall = int((bottom - top) * rng.uniform(0.6, 0.95))
+            if rng.uniform() < 0.92:
+                color = random_color(rng)
+                cv2.rectangle(image, (x, bottom - tall), (x + width - 2, bottom), color, -1)
+                stripe = bottom - int(tall * 0.7)
+                cv2.rectangle(image, (x, stripe), (x + width - 2, stripe + 4), (200, 200, 190), -1)
+            x += width
+    return image
+
+
+def poster(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """A picture, window, door or board for a wall."""
+    kind = rng.choice(['art', 'art', 'window', 'door', 'board', 'screen'])
+    if kind == 'window':
+        image = _flat(h, w, (235, 225, 205)) + 25 * smooth_noise(rng, h, w, 8)[..., None]
+        image[int(h * 0.6) :] *= (0.6, 0.75, 0.65)
+        image[:, w // 2 - 6 : w // 2 + 6] = 210
+        image[h // 2 - 6 : h // 2 + 6] = 210
+        frame: Color = (215, 215, 215)
+    elif kind == 'door':
+        return cabinet(rng, h, w)
+    elif kind == 'board':
+        image = _flat(h, w, (235, 238, 235))
+        for _ in range(int(rng.integers(3, 9))):
+            points = np.cumsum(rng.uniform(-w / 20, w / 16, (20, 2)), axis=0)
+            points += rng.uniform(0.2, 0.6, 2) * (w, h)
+            cv2.polylines(image, [points.astype(np.int32)], False, random_color(rng, (0.5, 1)), 2)
+        frame = (120, 120, 120)
+    elif kind == 'screen':
+        image = _flat(h, w, (35, 32, 30))
+        frame = (20, 20, 20)
+    else:
+        image = _flat(h, w, random_color(rng))
+        for _ in range(int(rng.integers(3, 12))):
+            centre = (int(rng.uniform(0, w)), int(rng.uniform(0, h)))
+            axes = (int(rng.uniform(w / 20, w / 3)), int(rng.uniform(h / 20, h / 3)))
+            cv2.ellipse(image, centre, axes, float(rng.uniform(0, 180)), 0, 360,
+                        random_color(rng), -1, cv2.LINE_AA)  # fmt: skip
+        frame = random_color(rng, (0, 0.4), (0.1, 0.6))
+    cv2.rectangle(image, (0, 0), (w - 1, h - 1), frame, max(4, w // 30))
+    return _shaded(rng, image, broad=0.03, grain=0.02)
+
+
+FURNITURE: tuple[Callable[[np.random.Generator, int, int], Texture], ...] = (
+    cabinet, bookshelf, cardboard, wood,
+)  # fmt: skip
