@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import bz2
+from pathlib import Path
 from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError
@@ -71,3 +72,24 @@ def _unzstd(data: bytes, limit: int) -> bytes:
         parts.append(part)
         left -= len(part)
     return parts[0] if len(parts) == 1 else b''.join(parts)
+
+
+def unpack_file(source: Path, target: Path) -> None:
+    """Decompress a zstd file into another file, as much of it as there is.
+
+    Raises:
+        RecordingError: where it cannot be read or is damaged at once.
+    """
+    import zstandard
+
+    try:
+        with source.open('rb') as packed, target.open('wb') as file:
+            reader: Any = zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(packed)
+            try:
+                while part := reader.read(1 << 22):
+                    file.write(part)
+            except zstandard.ZstdError as error:
+                if not file.tell():
+                    raise RecordingError(f'{source} is damaged: {error}') from None
+    except OSError as error:
+        raise RecordingError(f'{source} cannot be unpacked: {error.strerror or error}') from None

@@ -14,7 +14,6 @@ from typing import Protocol
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S
 
 NO_DEPTH = 'none'
 """As ``depth_topic``: read colour alone."""
@@ -28,7 +27,9 @@ class ReadOptions:
         color_topic: the colour topic of a bag, or None to find it.
         depth_topic: the depth topic of a bag, None to find it, ``'none'`` to read colour alone.
         info_topic: the CameraInfo topic of a bag, or None to find it.
-        tolerance_s: largest distance of stamps, in seconds, within a colour and depth pair.
+        tolerance_s: largest distance of stamps, in seconds, within a colour and depth pair; 0 pairs
+            equal stamps only. None: 20 ms, or up to half a second, with a warning, where not one
+            pair is as near as that (single shots, slow cameras).
         fps: frames per second of a sequence folder without ``timestamps.txt``.
         intrinsics: used instead of the recording's own.
 
@@ -39,14 +40,14 @@ class ReadOptions:
     color_topic: str | None = None
     depth_topic: str | None = None
     info_topic: str | None = None
-    tolerance_s: float = DEFAULT_TOLERANCE_S
+    tolerance_s: float | None = None
     fps: float = 30.0
     intrinsics: Intrinsics | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.fps <= 1e6:
             raise ParameterError(f'fps is {self.fps:g}: it must be above 0')
-        if not 0 <= self.tolerance_s <= 3600:
+        if self.tolerance_s is not None and not 0 <= self.tolerance_s <= 3600:
             raise ParameterError(f'tolerance is {self.tolerance_s:g} s: it must be 0 or more')
 
 

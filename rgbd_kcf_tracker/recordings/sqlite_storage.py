@@ -19,22 +19,17 @@ MAGIC = b'SQLite format 3\0'
 class SqliteStorage:
     """A :class:`Storage` of one ``.db3`` file.
 
-    Args:
-        path: the file.
-        whole: give the whole message as its head, which a compressed message needs.
-
     Raises:
         RecordingError: where the file cannot be opened or is no rosbag2 database.
     """
 
     ros1 = False
 
-    def __init__(self, path: Path, whole: bool = False) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
         self.warnings: list[str] = []
-        self._whole = whole
         try:
             with path.open('rb') as file:
                 magic = file.read(len(MAGIC))
@@ -72,8 +67,10 @@ class SqliteStorage:
         except sqlite3.Error as error:
             raise RecordingError(f'{self.path} is no rosbag2 database: {error}') from None
         self._read_definitions()
-        head = 'data' if self._whole else f'substr(data, 1, {HEAD})'
-        query = f'SELECT id, topic_id, timestamp, length(data), {head} FROM messages ORDER BY id'
+        query = (
+            f'SELECT id, topic_id, timestamp, length(data), substr(data, 1, {HEAD}) '
+            'FROM messages ORDER BY id'
+        )
         try:
             for number, topic, log_ns, length, data in self._database.execute(query):
                 if topic in names and isinstance(data, bytes):

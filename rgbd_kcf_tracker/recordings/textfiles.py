@@ -51,10 +51,14 @@ def read_boxes(path: Path) -> list[Box | None]:
 
 
 def format_box(box: Box | None) -> str:
-    """``box`` as a line of a ground-truth file; the shortest text that reads back exactly."""
+    """``box`` as a line of a ground-truth file, in thousandths of a pixel.
+
+    Polygon messages hold float32, which keeps thousandths: so a folder and a bag made from the
+    same boxes give the same numbers.
+    """
     if box is None:
         return 'nan,nan,nan,nan'
-    return ','.join(repr(round(value, 6)) for value in box.as_tuple())
+    return ','.join(f'{value:.3f}'.rstrip('0').rstrip('.') for value in box.as_tuple())
 
 
 def read_stamps(path: Path) -> list[int]:

@@ -1,0 +1,66 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What other messages than images mean: cameras, boxes, stamps; from rclpy or from rosbags."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+
+
+def intrinsics_from_info(msg: Any, rectified: bool = False) -> Intrinsics | None:
+    """The pinhole camera of a ``sensor_msgs/CameraInfo``.
+
+    Args:
+        msg: with ``k`` and ``p`` (ROS 2) or ``K`` and ``P`` (ROS 1).
+        rectified: the images are rectified, so that ``P`` holds; ``K`` where it is all zero.
+
+    Returns:
+        The intrinsics; None for an uncalibrated camera, whose matrices are zero.
+
+    Raises:
+        ImageError: where the numbers are no camera (negative, infinite, too few).
+    """
+    k: Any = msg.k if hasattr(msg, 'k') else getattr(msg, 'K', ())
+    p: Any = msg.p if hasattr(msg, 'p') else getattr(msg, 'P', ())
+    try:
+        from_k = tuple(float(k[i]) for i in (0, 4, 2, 5))
+        from_p = tuple(float(p[i]) for i in (0, 5, 2, 6))
+    except (IndexError, TypeError, ValueError):
+        raise ImageError('camera_info has no 3x3 K and 3x4 P: leave it out or calibrate') from None
+    values = from_p if rectified and from_p[0] and from_p[1] else from_k
+    if not values[0] and not values[1]:
+        values = from_p
+    if not values[0] and not values[1]:
+        return None
+    try:
+        return Intrinsics(*values)
+    except RgbdKcfError as error:
+        raise ImageError(f'camera_info is no camera: {error}') from None
+
+
+def is_rectified(topic: str) -> bool:
+    """Whether a topic's name says that its images are rectified, as drivers do by ``rect``."""
+    return 'rect' in topic.rpartition('/')[2] or '_rect/' in topic
+
+
+def box_from_polygon(points: Any) -> Box | None:
+    """The box around the points of a ``geometry_msgs/Polygon``; None without points.
+
+    Points are float32, so the box is rounded to thousandths of a pixel, which they hold exactly.
+    """
+    if not len(points):
+        return None
+    xs = [round(float(p.x), 3) for p in points]
+    ys = [round(float(p.y), 3) for p in points]
+    width, height = round(max(xs) - min(xs), 3), round(max(ys) - min(ys), 3)
+    return Box(min(xs), min(ys), width, height)
+
+
+def stamp_of(msg: Any) -> int:
+    """Nanoseconds of a message's header."""
+    stamp = msg.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -1,0 +1,35 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The one way to open any recording."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.recording import ReadOptions, Recording
+from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
+
+
+def open_recording(path: str | os.PathLike[str], options: ReadOptions | None = None) -> Recording:
+    """Open a bag (``.mcap``, rosbag2 folder, ``.db3``, ROS 1 ``.bag``) or a sequence folder.
+
+    Args:
+        path: the file or folder.
+        options: how to read it; the defaults find topics and intrinsics by themselves.
+
+    Raises:
+        RecordingError: where it is no recording, cannot be read, or its topics are not clear.
+    """
+    options = ReadOptions() if options is None else options
+    where = Path(path)
+    if not where.exists():
+        raise RecordingError(f'{where} does not exist')
+    if where.is_dir() and is_sequence_folder(where):
+        return SequenceFolder(where, options)
+    # The bag formats bring libraries that a sequence folder does without.
+    from rgbd_kcf_tracker.recordings.bags import BagRecording
+
+    return BagRecording(where, options)

@@ -1,0 +1,225 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A bag of any format as an index of topics and a way to read each message."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from heapq import merge
+from pathlib import Path
+from typing import Any, cast
+
+import yaml
+
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.compression import unpack, unpack_file
+from rgbd_kcf_tracker.recordings.mcap_storage import McapStorage
+from rgbd_kcf_tracker.recordings.ros1_storage import Ros1Storage
+from rgbd_kcf_tracker.recordings.sqlite_storage import SqliteStorage
+from rgbd_kcf_tracker.recordings.storage import Definition, Storage, Topic, header_stamp
+from rgbd_kcf_tracker.recordings.textfiles import natural_key
+
+_SUFFIXES = ('.mcap', '.db3', '.bag')
+
+
+class RawBag:
+    """All messages of a bag, still serialised.
+
+    Args:
+        path: an ``.mcap``, ``.db3`` or ROS 1 ``.bag`` file, or a folder of rosbag2, with or without
+            its ``metadata.yaml``.
+
+    Attributes:
+        kind: what it is, for people.
+        topics: by name, in the order of names.
+        definitions: texts of message types, as far as the bag holds them.
+        ros1: the messages are in ROS 1 serialisation.
+        warnings: what was odd.
+
+    Raises:
+        RecordingError: where it is no bag or cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.warnings: list[str] = []
+        self.definitions: dict[str, Definition] = {}
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        self._storages: list[Storage] = []
+        self._message_method = ''
+        try:
+            files = self._files_of_folder() if path.is_dir() else [path]
+            for file in files:
+                self._storages.append(_open_storage(file))
+            self.ros1 = any(s.ros1 for s in self._storages)
+            self.kind = self._describe()
+            self.topics = self._scan()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close all files."""
+        for storage in self._storages:
+            storage.close()
+        if self._temporary is not None:
+            self._temporary.cleanup()
+            self._temporary = None
+
+    def read(self, topic: Topic, index: int) -> bytes:
+        """The serialised message number ``index`` of a topic.
+
+        Raises:
+            RecordingError: where it cannot be read.
+        """
+        file, *where = topic.places[4 * index : 4 * index + 4]
+        data = self._storages[file].read((where[0], where[1], where[2]))
+        return unpack(self._message_method, data)
+
+    def message(self, topic: Topic, index: int) -> Any:
+        """The message number ``index`` of a topic, with its fields.
+
+        Raises:
+            RecordingError: where it cannot be read, or its bytes are not of the topic's type.
+        """
+        return self.deserialize(topic, self.read(topic, index), index)
+
+    def deserialize(self, topic: Topic, data: bytes, index: int) -> Any:
+        """Serialised bytes of a topic as a message with its fields; see :meth:`message`."""
+        store = typestore(self.ros1)
+        try:
+            if self.ros1:
+                return store.deserialize_ros1(data, topic.type)
+            return store.deserialize_cdr(data, topic.type)
+        except Exception as error:  # a hostile message makes the library raise anything
+            raise RecordingError(
+                f'{self.path}: message {index} of {topic.name} is no {topic.type}: '
+                f'{error or type(error).__name__}'
+            ) from None
+
+    def in_order(self) -> Iterator[tuple[Topic, int]]:
+        """All messages of all topics by time of recording: topic and number in it."""
+        streams = [
+            ((log_ns, number, index) for index, log_ns in enumerate(topic.log_ns))
+            for number, topic in enumerate(self.topics.values())
+        ]
+        topics = list(self.topics.values())
+        for _, number, index in merge(*streams):
+            yield topics[number], index
+
+    def _scan(self) -> dict[str, Topic]:
+        topics: dict[str, Topic] = {}
+        for number, storage in enumerate(self._storages):
+            for message in storage.scan():
+                topic = topics.get(message.topic)
+                if topic is None:
+                    topic = topics[message.topic] = Topic(message.topic, message.type)
+                if topic.type != message.type:
+                    continue
+                topic.add(number, message, storage.ros1)
+                if self._message_method:
+                    head = unpack(self._message_method, storage.read(message.where))
+                    topic.stamp_ns[-1] = header_stamp(head, storage.ros1)
+            for name, kind in storage.topics.items():
+                topics.setdefault(name, Topic(name, kind))
+            self.definitions.update(storage.definitions)
+            self.warnings += storage.warnings
+        for topic in topics.values():
+            topic.sort()
+        return dict(sorted(topics.items()))
+
+    def _files_of_folder(self) -> list[Path]:
+        metadata = self._metadata()
+        names: list[str] = []
+        if metadata:
+            names = [Path(str(name)).name for name in metadata.get('relative_file_paths') or ()]
+            mode = str(metadata.get('compression_mode') or '').lower()
+            if mode == 'message':
+                self._message_method = str(metadata.get('compression_format') or 'zstd')
+        present = {
+            p.name: p
+            for p in sorted(self.path.iterdir(), key=lambda p: natural_key(p.name))
+            if p.name.removesuffix('.zstd').endswith(_SUFFIXES)
+        }
+        missing = [name for name in names if name not in present]
+        if missing:
+            self.warnings.append(
+                f'{self.path}: metadata.yaml names {", ".join(missing)}, which is not there'
+            )
+        found = [present[n] for n in names if n in present] + [
+            p for n, p in present.items() if n not in names
+        ]
+        kinds = {p.name.removesuffix('.zstd').rpartition('.')[2] for p in found}
+        if not found:
+            raise RecordingError(
+                f'{self.path} is no recording: it holds neither .mcap, .db3 nor .bag files, nor a '
+                'folder rgb with images'
+            )
+        if len(kinds) > 1 or kinds == {'bag'}:
+            raise RecordingError(
+                f'{self.path} holds several recordings ({", ".join(p.name for p in found[:5])}): '
+                'name one of them'
+            )
+        if not metadata:
+            self.warnings.append(
+                f'{self.path} has no metadata.yaml: all its {kinds.pop()} files are read as one bag'
+            )
+        return [self._unzipped(p) if p.suffix == '.zstd' else p for p in found]
+
+    def _metadata(self) -> dict[str, Any]:
+        path = self.path / 'metadata.yaml'
+        if not path.exists():
+            return {}
+        try:
+            content = yaml.safe_load(path.read_text(encoding='utf-8'))
+            return cast('dict[str, Any]', dict(content['rosbag2_bagfile_information']))
+        except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+            self.warnings.append(f'{path} cannot be understood: it is left out')
+            return {}
+
+    def _unzipped(self, path: Path) -> Path:
+        if self._temporary is None:
+            self._temporary = tempfile.TemporaryDirectory(prefix='rgbd_kcf_')
+        target = Path(self._temporary.name) / path.name.removesuffix('.zstd')
+        unpack_file(path, target)
+        return target
+
+    def _describe(self) -> str:
+        kind = {McapStorage: 'mcap', SqliteStorage: 'sqlite3', Ros1Storage: 'ROS 1 bag'}[
+            cast(Any, type(self._storages[0]))
+        ]
+        return f'rosbag2 folder ({kind})' if self.path.is_dir() else kind
+
+
+def _open_storage(path: Path) -> Storage:
+    """The storage for a file, by its first bytes; its name is only asked for the message."""
+    try:
+        with path.open('rb') as file:
+            head = file.read(16)
+    except OSError as error:
+        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+    if not head:
+        raise RecordingError(f'{path} is empty: nothing was recorded')
+    if head.startswith(b'\x89MCAP'):
+        return McapStorage(path)
+    if head.startswith(b'#ROSBAG'):
+        return Ros1Storage(path)
+    if head.startswith(b'SQLite'):
+        return SqliteStorage(path)
+    raise RecordingError(
+        f'{path} is no recording: it is neither an MCAP file, a rosbag2 database nor a ROS 1 bag'
+    )
+
+
+_TYPESTORES: dict[bool, Any] = {}
+
+
+def typestore(ros1: bool = False) -> Any:
+    """The message types of ROS 2 Jazzy or, for old bags, ROS 1 Noetic (rosbags' typestore)."""
+    if ros1 not in _TYPESTORES:
+        from rosbags.typesys import Stores, get_typestore
+
+        _TYPESTORES[ros1] = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_JAZZY)
+    return _TYPESTORES[ros1]
