@@ -15,15 +15,35 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, ShutdownException, SingleThreadedExecutor
+from rclpy.executors import (
+    Executor,
+    ExternalShutdownException,
+    ShutdownException,
+    SingleThreadedExecutor,
+)
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from rgbd_kcf_tracker.ros.memory import keep_large_blocks
 
-__all__ = ['keep_large_blocks', 'run']
+__all__ = ['keep_large_blocks', 'run', 'spin']
 
 _SPIN_PERIOD_S = 0.25
+
+
+def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
+    """Run callbacks until ``stopped`` or the context ends; what a callback raises is logged.
+
+    A message whose strings are no UTF-8, or a lifecycle request that does not fit the state, raises
+    inside rclpy: it must not end the node.
+    """
+    while not stopped() and executor.context.ok():
+        try:
+            executor.spin_once(timeout_sec=_SPIN_PERIOD_S)
+        except (ExternalShutdownException, ShutdownException):
+            break
+        except Exception as error:
+            node.get_logger().error(f'{type(error).__name__}: {error}')
 
 
 def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
@@ -46,13 +66,7 @@ def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
     try:
         node = make()
         executor.add_node(node)
-        while not stop and rclpy.ok():
-            try:
-                executor.spin_once(timeout_sec=_SPIN_PERIOD_S)
-            except (ExternalShutdownException, ShutdownException):
-                break
-            except Exception as error:  # one bad message or request must not end the node
-                node.get_logger().error(f'{type(error).__name__}: {error}')
+        spin(executor, node, lambda: bool(stop))
         return 0
     except Exception as error:
         print(f'cannot start: {error}', file=sys.stderr)
