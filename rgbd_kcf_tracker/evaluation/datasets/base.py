@@ -1,0 +1,145 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a benchmark sequence is to the runner, whatever format it lies in.
+
+A :class:`Sequence` is small, can be sent to another process, and is opened only where it runs, so a
+broken one fails alone. Opened, it gives :class:`Sample` after :class:`Sample`: a frame and what is
+true of it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import DatasetError, ParameterError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """One frame and its truth.
+
+    Attributes:
+        frame: colour, depth, stamp.
+        visible: box of the visible part, None where the target is absent.
+        body: box of the whole target where known (simulated scenes), else None.
+        fraction: how much of the target shows, 0 to 1, None where unknown.
+    """
+
+    frame: Frame
+    visible: Box | None
+    body: Box | None = None
+    fraction: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Opened:
+    """A sequence that is being read.
+
+    Attributes:
+        samples: in time order, to be gone through once.
+        length: number of samples, None where unknown before the end.
+        start: index of the first sample among the frames of the recording.
+        total: frames of the recording, those before and after the samples included.
+        annotated: False where only the first box is known (Princeton's test set): it can be run,
+            and its results written for submission, but not measured.
+        has_body: whether ``body`` boxes are given.
+        warnings: what was odd.
+    """
+
+    samples: Iterable[Sample]
+    length: int | None = None
+    start: int = 0
+    total: int | None = None
+    annotated: bool = True
+    has_body: bool = False
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """A sequence that can be opened.
+
+    Attributes:
+        name: unique within a run.
+        scenario: the group it belongs to in tables.
+        kind: format it lies in: folder, otb, vot, princeton, sim or recording.
+        open: opens it; made with :func:`functools.partial` so that it can be pickled.
+        identity: changes whenever other frames or another truth would come out.
+        categories: Princeton's splits, as far as known.
+        origin: pixel coordinate of the first column and row in the data set's files, 0 or 1.
+        path: where it lies; None for simulated scenes.
+    """
+
+    name: str
+    scenario: str
+    kind: str
+    open: Callable[[], Opened]
+    identity: str
+    categories: Mapping[str, str] = field(default_factory=dict)
+    origin: int = 0
+    path: Path | None = None
+
+
+def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:
+    """The samples as a colour camera gives them."""
+    for sample in samples:
+        yield dataclasses.replace(sample, frame=dataclasses.replace(sample.frame, depth=None))
+
+
+def at_rate(samples: Iterable[Sample], rate_hz: float) -> Iterator[Sample]:
+    """The samples thinned out to at most ``rate_hz``, by their stamps; the first always stays.
+
+    Raises:
+        ParameterError: for a rate that is not above 0.
+    """
+    if not rate_hz > 0:
+        raise ParameterError(f'rate is {rate_hz:g} Hz: it must be above 0')
+    period = 1e9 / rate_hz
+    due: float | None = None
+    for sample in samples:
+        stamp = sample.frame.stamp_ns
+        # A tenth of a period early is on time: stamps are rounded, and cameras jitter.
+        if due is not None and stamp < due - period / 10:
+            continue
+        # The grid of due times stays while frames come in time, so that the mean rate holds.
+        due = stamp + period if due is None or stamp > due + period else due + period
+        yield sample
+
+
+def from_first_box(samples: Iterable[Sample]) -> Iterator[Sample]:
+    """The samples from the first in which the target shows."""
+    started = False
+    for sample in samples:
+        started = started or sample.visible is not None
+        if started:
+            yield sample
+
+
+def file_token(*paths: Path) -> str:
+    """Size and time of files, for :attr:`Sequence.identity`; a missing file is part of it."""
+    parts = []
+    for path in paths:
+        try:
+            stat = path.stat()
+            parts.append(f'{path.resolve()}:{stat.st_size}:{stat.st_mtime_ns}')
+        except OSError:
+            parts.append(f'{path}:-')
+    return '|'.join(parts)
+
+
+def folders(path: Path) -> list[Path]:
+    """The folders in a folder, sorted by name, hidden ones left out.
+
+    Raises:
+        DatasetError: where it cannot be read.
+    """
+    try:
+        return sorted(p for p in path.iterdir() if p.is_dir() and not p.name.startswith('.'))
+    except OSError as error:
+        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None

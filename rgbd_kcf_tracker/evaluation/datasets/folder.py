@@ -1,0 +1,138 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Our own folder layout: ``rgb/``, ``depth/``, one ground truth, or one per annotated person."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.images import (
+    ImageFrames,
+    check_lengths,
+    even_stamps,
+    image_files,
+)
+from rgbd_kcf_tracker.recordings.textfiles import (
+    read_boxes,
+    read_intrinsics,
+    read_lines,
+    read_stamps,
+)
+
+CLEAR_FRACTION = 0.5
+"""A target is clearly in view where at least this share of it shows (by ``visible.txt``)."""
+
+TAIL_FRAMES = 15
+"""Frames after a person was last seen that still count: the tracker must say that they are gone."""
+
+_BODY = 'groundtruth_body.txt'
+
+
+def is_sequence(path: Path) -> bool:
+    """Whether a folder is a sequence in our layout, annotated or not."""
+    return (path / 'rgb').is_dir()
+
+
+def find(path: Path, fps: float) -> list[Sequence]:
+    """The targets of a folder: one per ``groundtruth_PERSON.txt``, else groundtruth.txt's."""
+    people = sorted(p for p in path.glob('groundtruth_*.txt') if p.name != _BODY)
+    result = []
+    for truth in people or [path / 'groundtruth.txt']:
+        person = truth.stem.removeprefix('groundtruth').removeprefix('_')
+        visible = path / (f'visible_{person}.txt' if person else 'visible.txt')
+        files = (truth, visible, path / _BODY, path / 'timestamps.txt', path / 'intrinsics.json')
+        result.append(
+            Sequence(
+                name=f'{path.name}/{person}' if person else path.name,
+                scenario=_scenario(path, bool(person)),
+                kind='folder',
+                open=partial(load, path, truth, visible, bool(person), fps),
+                identity=f'folder:{file_token(*files)}:{fps}',
+                path=path,
+            )
+        )
+    return result
+
+
+def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: float) -> Opened:
+    """Open one target of a folder.
+
+    It starts where the target is first clearly in view. A person among several ends
+    :data:`TAIL_FRAMES` frames after they were last seen; a single target with the recording.
+
+    Raises:
+        DatasetError: where numbers of lines and images differ, or the target is never seen.
+        RecordingError: for a file that cannot be read or a line that is no box.
+    """
+    images = image_files(path / 'rgb')
+    if not truth_path.is_file():
+        raise DatasetError(f'{path} has no {truth_path.name}: nothing to measure against')
+    boxes = read_boxes(truth_path)
+    check_lengths(truth_path, len(boxes), images, path / 'rgb')
+    body = None
+    if not person and (path / _BODY).is_file():
+        body = read_boxes(path / _BODY)
+        check_lengths(path / _BODY, len(body), images, path / 'rgb')
+    fractions = None
+    if visible_path.is_file():
+        fractions = read_fractions(visible_path)
+        check_lengths(visible_path, len(fractions), images, path / 'rgb')
+
+    seen = [i for i, box in enumerate(boxes) if box is not None]
+    clear = [i for i in seen if fractions is None or fractions[i] >= CLEAR_FRACTION]
+    if not seen:
+        raise DatasetError(f'{truth_path}: no line holds a box: the target is never seen')
+    start = clear[0] if clear else seen[0]
+    end = min(len(images), seen[-1] + TAIL_FRAMES + 1) if person else len(images)
+    frames = _frames(path, images, fps)
+    return Opened(
+        frames.samples(boxes, body, fractions, start, end),
+        length=end - start,
+        start=start,
+        total=len(images),
+        has_body=body is not None,
+    )
+
+
+def read_fractions(path: Path) -> list[float]:
+    """The first number of each line: how much of the target shows, 0 to 1.
+
+    Raises:
+        DatasetError: naming the line without a number.
+    """
+    result = []
+    for number, line in enumerate(read_lines(path), start=1):
+        try:
+            result.append(float(line.replace(',', ' ').split()[0]))
+        except (ValueError, IndexError):
+            raise DatasetError(
+                f'{path}, line {number}: {line.strip()[:60]!r}: write the visible share, 0 to 1'
+            ) from None
+    return result
+
+
+def _scenario(path: Path, person: bool) -> str:
+    return path.name if person else path.resolve().parent.name
+
+
+def _frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames:
+    depths: tuple[Path | None, ...] = ()
+    if (path / 'depth').is_dir():
+        by_stem = {p.stem: p for p in image_files(path / 'depth')}
+        depths = tuple(by_stem.get(p.stem) for p in images)
+        lost = next((p for p, d in zip(images, depths, strict=True) if d is None), None)
+        if lost is not None:
+            raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')
+    stamps = even_stamps(len(images), fps)
+    stamps_path = path / 'timestamps.txt'
+    if stamps_path.is_file():
+        stamps = tuple(read_stamps(stamps_path))
+        check_lengths(stamps_path, len(stamps), images, path / 'rgb')
+    intrinsics = None
+    if (path / 'intrinsics.json').is_file():
+        intrinsics = read_intrinsics(path / 'intrinsics.json')
+    return ImageFrames(images, depths, stamps, intrinsics)

@@ -1,0 +1,93 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Simulated scenes as a data set: ``sim:SCENARIO[:SEED[-SEED]]``, ``sim:all``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from collections.abc import Sequence as Items
+from functools import partial
+
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence
+from rgbd_kcf_tracker.simulation import SCENARIOS, simulate
+
+PREFIX = 'sim:'
+ALL = 'all'
+
+
+def find(
+    text: str,
+    seeds: Items[int],
+    scenarios: Items[str] = (),
+    rate_hz: float = 30.0,
+    duration_s: float | None = None,
+    size: tuple[int, int] = (960, 540),
+) -> list[Sequence]:
+    """The scenes that ``text`` names.
+
+    Args:
+        text: ``sim:all``, ``sim:occlusion``, ``sim:occlusion:3``, ``sim:all:1-5``,
+            ``sim:normal,crowd:2``.
+        seeds: where ``text`` names none.
+        scenarios: leave out all others; empty for none.
+        rate_hz: frames per second.
+        duration_s: length of each scene, None for its own.
+        size: of the images, width and height in pixels.
+
+    Raises:
+        DatasetError: for an unknown scenario or a seed that is no number.
+    """
+    names, _, seed_text = text.removeprefix(PREFIX).partition(':')
+    chosen = list(SCENARIOS) if names == ALL else [n.strip() for n in names.split(',')]
+    for name in (*chosen, *scenarios):
+        if name not in SCENARIOS:
+            raise DatasetError(
+                f'unknown scenario {name!r}: choose from all, {", ".join(SCENARIOS)}'
+            )
+    if scenarios:
+        chosen = [name for name in chosen if name in scenarios]
+    return [
+        Sequence(
+            name=f'{name}/{seed}',
+            scenario=name,
+            kind='sim',
+            open=partial(load, name, seed, rate_hz, duration_s, size),
+            identity=f'sim:{name}:{seed}:{rate_hz}:{duration_s}:{size}',
+        )
+        for name in chosen
+        for seed in (parse_seeds(seed_text) if seed_text else seeds)
+    ]
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds of ``3``, ``1-5`` or ``1,4,7-9``.
+
+    Raises:
+        DatasetError: where the text is none of these.
+    """
+    seeds: list[int] = []
+    try:
+        for part in text.split(','):
+            first, dash, last = part.partition('-')
+            low, high = int(first), int(last) if dash else int(first)
+            if high < low or high - low > 100_000:
+                raise ValueError
+            seeds.extend(range(low, high + 1))
+    except ValueError:
+        raise DatasetError(f'seeds {text!r}: give numbers like 3, 1-5 or 1,4,7-9') from None
+    return list(dict.fromkeys(seeds))
+
+
+def load(
+    scenario: str, seed: int, rate_hz: float, duration_s: float | None, size: tuple[int, int]
+) -> Opened:
+    """Render one scene, frame by frame as it is read."""
+    scene = simulate(scenario, seed=seed, rate_hz=rate_hz, duration_s=duration_s, size=size)
+
+    def samples() -> Iterator[Sample]:
+        for moment in scene:
+            yield Sample(moment.frame, moment.visible, moment.body, moment.visible_fraction)
+
+    return Opened(samples(), len(scene), has_body=True)

@@ -1,0 +1,221 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One job: a sequence by the trackers that have not run on it yet, and what it leaves on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import rgbd_kcf_tracker
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.evaluation import boxfiles
+from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    Opened,
+    Sample,
+    Sequence,
+    at_rate,
+    from_first_box,
+    without_depth,
+)
+from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
+from rgbd_kcf_tracker.evaluation.store import (
+    slug,
+    write_atomically,
+    write_json,
+    write_tracks,
+    write_truth,
+)
+
+_CODE = ('geometry.py', 'frame.py', 'features', 'filters', 'trackers', 'simulation', 'recordings')
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How sequences are run.
+
+    Attributes:
+        rate_hz: thin recordings out to this rate; None leaves them.
+        use_depth: False drops the depth images.
+        short_term: also run VOT's protocol with re-initialisation.
+        jobs: parallel processes.
+        fresh: run again what is already there.
+    """
+
+    rate_hz: float | None = None
+    use_depth: bool = True
+    short_term: bool = False
+    jobs: int = 1
+    fresh: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A sequence that could not be run, for one tracker or (empty) for all."""
+
+    sequence: str
+    tracker: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One sequence and the trackers that have not run on it yet."""
+
+    sequence: Sequence
+    contenders: tuple[Contender, ...]
+    folder: Path
+    options: RunOptions
+
+
+def truth_path(folder: Path, sequence: str) -> Path:
+    """Where the truth of a sequence lies."""
+    return folder / 'truth' / f'{slug(sequence)}.csv'
+
+
+def tracks_path(folder: Path, tracker: str, sequence: str) -> Path:
+    """Where a tracker's tracks of a sequence lie."""
+    return folder / 'results' / slug(tracker) / f'{slug(sequence)}.csv'
+
+
+def meta_path(tracks: Path) -> Path:
+    """Key, times and the short-term run beside a file of tracks; written last, so it vouches."""
+    return tracks.with_suffix('.json')
+
+
+def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> str:
+    """What decides the outcome of a run, as a short text."""
+    extra = ''
+    if contender.kind == 'boxes':
+        try:
+            stat = boxfiles.find_file(contender.target, sequence).stat()
+            extra = f'{stat.st_size}:{stat.st_mtime_ns}'
+        except RgbdKcfError:
+            extra = 'missing'
+    parts = [
+        sequence.identity, contender.identity, extra, code_digest(),
+        options.rate_hz, options.use_depth, options.short_term,
+    ]  # fmt: skip
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
+
+
+@cache
+def code_digest() -> str:
+    """Version and digest of the code that makes frames and tracks."""
+    root = Path(rgbd_kcf_tracker.__file__).parent
+    digest = hashlib.sha256(rgbd_kcf_tracker.__version__.encode())
+    for name in _CODE:
+        place = root / name
+        for path in [place] if place.is_file() else sorted(place.rglob('*.py')):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def run_job(job: Job) -> list[Failure]:
+    """Run one sequence; whatever goes wrong is returned, not raised."""
+    try:
+        return _run_sequence(job)
+    except RgbdKcfError as error:
+        return [Failure(job.sequence.name, '', str(error))]
+    except Exception:
+        return [Failure(job.sequence.name, '', traceback.format_exc().strip())]
+
+
+def _run_sequence(job: Job) -> list[Failure]:
+    sequence, options = job.sequence, job.options
+    opened = sequence.open()
+    passes: dict[str, OnePass] = {}
+    restarts: dict[str, WithRestarts] = {}
+    for contender in job.contenders:
+        if contender.kind != 'boxes':
+            passes[contender.name] = OnePass(contender.make())
+            if options.short_term and opened.annotated:
+                restarts[contender.name] = WithRestarts(contender.make())
+    thumbnails, samples = Thumbnails(), []
+    for sample in _samples(opened, sequence, options):
+        samples.append((sample.frame.stamp_ns, sample.visible, sample.body, sample.fraction))
+        thumbnails.feed(sample.frame)
+        for one in (*passes.values(), *restarts.values()):
+            one.feed(sample)
+    if not samples:
+        raise RgbdKcfError(f'{sequence.name}: the target never shows')
+    stamps = [s[0] for s in samples]
+    body = [s[2] for s in samples] if opened.has_body else None
+    write_truth(
+        truth_path(job.folder, sequence.name),
+        stamps, [s[1] for s in samples], body, [s[3] for s in samples],
+    )  # fmt: skip
+    for index, data in thumbnails.pictures.items():
+        write_atomically(job.folder / 'thumbs' / slug(sequence.name) / f'{index:06d}.jpg', data)
+
+    failures = []
+    for contender in job.contenders:
+        one = passes.get(contender.name) or _from_file(contender, sequence, opened, len(samples))
+        restart = restarts.get(contender.name)
+        reason = one.error or (restart.error if restart else '')
+        if reason:
+            failures.append(Failure(sequence.name, contender.name, reason))
+            continue
+        target = tracks_path(job.folder, contender.name, sequence.name)
+        write_tracks(target, stamps, one.tracks)
+        write_json(meta_path(target), _meta(job, contender, one, restart, opened, thumbnails.scale))
+    return failures
+
+
+def _from_file(contender: Contender, sequence: Sequence, opened: Opened, frames: int) -> OnePass:
+    try:
+        path = boxfiles.find_file(contender.target, sequence)
+        return OnePass(None, tracks=boxfiles.read(path, sequence, opened, frames))
+    except RgbdKcfError as error:
+        return OnePass(None, error=str(error))
+
+
+def _meta(
+    job: Job,
+    contender: Contender,
+    one: OnePass,
+    restart: WithRestarts | None,
+    opened: Opened,
+    scale: float,
+) -> dict[str, Any]:
+    sequence = job.sequence
+    meta: dict[str, Any] = {
+        'key': run_key(sequence, contender, job.options),
+        'tracker': contender.name,
+        'sequence': sequence.name,
+        'scenario': sequence.scenario,
+        'kind': sequence.kind,
+        'origin': sequence.origin,
+        'annotated': opened.annotated,
+        'categories': dict(sequence.categories),
+        'version': rgbd_kcf_tracker.__version__,
+        'warnings': list(opened.warnings),
+        'thumbnail_scale': scale,
+        'milliseconds': [round(ms, 3) for ms in one.milliseconds],
+    }
+    if restart is not None:
+        run = restart.run()
+        meta['short_term'] = {
+            'codes': [int(c) for c in restart.codes],
+            'boxes': [list(t.box.as_tuple()) if t.box else None for t in restart.tracks],
+            'run_codes': run.codes.tolist(),
+            'run_overlaps': run.overlaps.tolist(),
+        }
+    return meta
+
+
+def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterator[Sample]:
+    samples: Any = from_first_box(opened.samples)
+    if options.rate_hz is not None and sequence.kind != 'sim':  # scenes are rendered at their rate
+        samples = at_rate(samples, options.rate_hz)
+    if not options.use_depth:
+        samples = without_depth(samples)
+    yield from samples

@@ -1,0 +1,152 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One sequence, several trackers: the loop that everything measured comes from.
+
+The sequence is read (or rendered) once, and every tracker gets the same frames.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import traceback
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.evaluation.datasets.base import Sample
+from rgbd_kcf_tracker.evaluation.metrics import vot
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.trackers import Track, Tracker, TrackState
+
+THUMBNAIL_WIDTH = 320
+THUMBNAILS = 24
+_NO_BOX = Track(None, TrackState.IDLE)
+
+
+@dataclass(eq=False)
+class OnePass:
+    """A tracker started once, on the first frame, and left alone.
+
+    Attributes:
+        tracker: what is run; None where the tracks come from a file.
+        tracks: one per frame.
+        milliseconds: of each call.
+        error: why it stopped, empty while it runs.
+    """
+
+    tracker: Tracker | None
+    tracks: list[Track] = field(default_factory=list)
+    milliseconds: list[float] = field(default_factory=list)
+    error: str = ''
+
+    def feed(self, sample: Sample) -> None:
+        """Give the tracker one more frame; an exception stops this tracker, not the run."""
+        if self.error or self.tracker is None:
+            return
+        try:
+            self._step(self.tracker, sample)
+        except RgbdKcfError as error:
+            self.error = f'frame {len(self.tracks)}: {error}'
+        except Exception:
+            self.error = f'frame {len(self.tracks)}: {traceback.format_exc().strip()}'
+
+    def _step(self, tracker: Tracker, sample: Sample) -> None:
+        start = not self.tracks
+        box = sample.visible
+        if start and box is None:
+            raise RgbdKcfError('the first frame has no box')
+        before = time.perf_counter()
+        if start and box is not None:
+            track = tracker.start(sample.frame, box)
+        else:
+            track = tracker.update(sample.frame)
+        self.milliseconds.append((time.perf_counter() - before) * 1000)
+        self.tracks.append(track)
+
+
+@dataclass(eq=False)
+class WithRestarts(OnePass):
+    """A tracker under VOT's short-term protocol: started again a few frames after each failure.
+
+    Frames in which the target is absent are gone through, but neither fail nor count.
+
+    Attributes:
+        codes: a :class:`vot.Code` per frame.
+        overlaps: IoU with the visible part or the whole body, whichever is more; NaN if absent.
+    """
+
+    codes: list[vot.Code] = field(default_factory=list)
+    overlaps: list[float] = field(default_factory=list)
+    _running: bool = False
+    _wait: int = 0
+
+    def run(self) -> vot.ShortTermRun:
+        """What the measures take: the frames in which the target shows."""
+        overlaps = np.array(self.overlaps, np.float64)
+        there = ~np.isnan(overlaps)
+        return vot.ShortTermRun(np.array(self.codes, np.int64)[there], overlaps[there])
+
+    def _step(self, tracker: Tracker, sample: Sample) -> None:
+        box = sample.visible
+        self._wait = max(0, self._wait - 1)
+        before = time.perf_counter()
+        track, code, overlap = _NO_BOX, vot.Code.SKIPPED, math.nan if box is None else 0.0
+        if not self._running:
+            if box is not None and self._wait == 0:
+                track, code, overlap = tracker.start(sample.frame, box), vot.Code.START, 1.0
+                self._running = True
+        else:
+            track = tracker.update(sample.frame)
+            code = vot.Code.TRACKED
+            if box is not None:
+                overlap = _best_overlap(track.box, box, sample.body)
+                if overlap <= 0:
+                    code, self._running, self._wait = vot.Code.FAILURE, False, vot.SKIP
+        self.milliseconds.append((time.perf_counter() - before) * 1000)
+        self.tracks.append(track)
+        self.codes.append(code)
+        self.overlaps.append(overlap)
+
+
+def _best_overlap(box: Box | None, visible: Box, body: Box | None) -> float:
+    if box is None:
+        return 0.0
+    return max(box.iou(visible), box.iou(body) if body is not None else 0.0)
+
+
+class Thumbnails:
+    """Small pictures of a sequence, evenly spread, whatever its length turns out to be."""
+
+    def __init__(self, most: int = THUMBNAILS) -> None:
+        self._most = most
+        self._step = 1
+        self._kept: dict[int, bytes] = {}
+        self._index = 0
+        self.scale = 1.0
+
+    def feed(self, frame: Frame) -> None:
+        """Keep the frame's picture if it falls on the grid; the grid widens when it is full."""
+        if self._index % self._step == 0:
+            self.scale = min(1.0, THUMBNAIL_WIDTH / frame.width)
+            size = (round(frame.width * self.scale), round(frame.height * self.scale))
+            small: npt.NDArray[np.uint8] = np.asarray(
+                cv2.resize(frame.color, size, interpolation=cv2.INTER_AREA), np.uint8
+            )
+            done, data = cv2.imencode('.jpg', small, [cv2.IMWRITE_JPEG_QUALITY, 80])
+            if done:
+                self._kept[self._index] = data.tobytes()
+            if len(self._kept) > 2 * self._most:
+                self._step *= 2
+                self._kept = {k: v for k, v in self._kept.items() if k % self._step == 0}
+        self._index += 1
+
+    @property
+    def pictures(self) -> dict[int, bytes]:
+        """JPEG data by frame index."""
+        return self._kept

@@ -1,0 +1,83 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Many sequences by many trackers, in parallel processes, going on where it was interrupted."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+
+from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
+from rgbd_kcf_tracker.evaluation.jobs import (
+    Failure,
+    Job,
+    RunOptions,
+    meta_path,
+    run_job,
+    run_key,
+    tracks_path,
+    truth_path,
+)
+from rgbd_kcf_tracker.evaluation.pool import Report, run_parallel
+
+
+def run(
+    sequences: list[Sequence],
+    contenders: list[Contender],
+    folder: Path,
+    options: RunOptions,
+    report: Report = lambda done, name: None,
+) -> list[Failure]:
+    """Run every contender on every sequence that it has not run on yet.
+
+    Args:
+        sequences: what to run on.
+        contenders: what to run.
+        folder: where results go.
+        options: how.
+        report: is told of progress, the runs found done at first.
+
+    Returns:
+        What failed; everything else is in ``folder``.
+    """
+    jobs: list[Job] = []
+    for sequence in sequences:
+        open_runs = tuple(
+            c for c in contenders if options.fresh or not is_done(folder, sequence, c, options)
+        )
+        report(len(contenders) - len(open_runs), sequence.name)
+        if not open_runs:
+            continue
+        if len(sequences) < options.jobs:  # too few sequences to keep all processes busy
+            jobs.extend(Job(sequence, (c,), folder, options) for c in open_runs)
+        else:
+            jobs.append(Job(sequence, open_runs, folder, options))
+    failures: list[Failure] = []
+    if options.jobs <= 1:
+        threads = cv2.getNumThreads()
+        cv2.setNumThreads(1)
+        try:
+            for job in jobs:
+                failures.extend(run_job(job))
+                report(len(job.contenders), job.sequence.name)
+        finally:
+            cv2.setNumThreads(threads)
+    else:
+        failures.extend(run_parallel(jobs, options.jobs, report))
+    return failures
+
+
+def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
+    """Whether the same run has been made: same frames, parameters, code and options."""
+    tracks = tracks_path(folder, contender.name, sequence.name)
+    if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
+        return False
+    try:
+        meta = json.loads(meta_path(tracks).read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        return False
+    return bool(meta.get('key') == run_key(sequence, contender, options))

@@ -1,0 +1,193 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a run leaves on the disk: one file of tracks per tracker and sequence, one of truth.
+
+Every file is written whole under another name and then moved into place, so that an interrupted run
+leaves only good files, and goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.trackers import Track
+
+TRACK_HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
+TRUTH_HEADER = (
+    'frame', 'stamp_ns', 'x', 'y', 'width', 'height',
+    'body_x', 'body_y', 'body_width', 'body_height', 'visible_fraction',
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracks:
+    """A tracker's answers to ``N`` frames: boxes ``(N, 4)``, states, scores ``(N,)``."""
+
+    boxes: Array
+    states: tuple[str, ...]
+    scores: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Truth:
+    """What is true of one sequence.
+
+    Attributes:
+        stamps_ns: one per frame.
+        visible: ``(N, 4)``, NaN where absent.
+        body: ``(N, 4)`` or None where not known.
+        fraction: ``(N,)`` visible share, NaN where unknown.
+    """
+
+    stamps_ns: tuple[int, ...]
+    visible: Array
+    body: Array | None
+    fraction: Array
+
+
+def slug(name: str) -> str:
+    """A name as a file's: other characters than letters, digits, dots and dashes replaced."""
+    return re.sub(r'[^A-Za-z0-9.=-]+', '_', name).strip('._') or '_'
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Write a file under another name, then move it into place."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        if isinstance(data, str):
+            temporary.write_text(data, encoding='utf-8')
+        else:
+            temporary.write_bytes(data)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """JSON, readable, NaN as null."""
+    write_atomically(path, json.dumps(_plain(value), indent=1, allow_nan=False) + '\n')
+
+
+def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:
+    """One row per frame, in the format of ``rgbd-kcf track --output``."""
+    rows = [
+        (
+            index, stamp, *_cells(track.box), track.state.value,
+            '' if track.box is None else f'{track.score:.4f}',
+            '' if track.depth is None else f'{track.depth:.4f}',
+        )
+        for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True))
+    ]  # fmt: skip
+    write_atomically(path, _csv(TRACK_HEADER, rows))
+
+
+def read_tracks(path: Path) -> Tracks:
+    """A file of tracks.
+
+    Raises:
+        DatasetError: naming the line that is none.
+    """
+    rows = _rows(path, TRACK_HEADER[:8])
+    boxes, scores, states = np.full((len(rows), 4), np.nan), np.full(len(rows), np.nan), []
+    for index, row in enumerate(rows):
+        try:
+            boxes[index] = [_number(row[k]) for k in ('x', 'y', 'width', 'height')]
+            scores[index] = _number(row['score'])
+        except ValueError:
+            raise DatasetError(f'{path}, line {index + 2}: a cell is no number') from None
+        states.append(row['state'])
+    return Tracks(boxes, tuple(states), scores)
+
+
+def write_truth(
+    path: Path,
+    stamps_ns: Sequence[int],
+    visible: Sequence[Box | None],
+    body: Sequence[Box | None] | None,
+    fraction: Sequence[float | None],
+) -> None:
+    """One row per frame; empty cells where there is nothing."""
+    whole = body if body is not None else [None] * len(visible)
+    rows = [
+        (i, stamp, *_cells(v), *_cells(b), '' if f is None else f'{f:.4f}')
+        for i, (stamp, v, b, f) in enumerate(zip(stamps_ns, visible, whole, fraction, strict=True))
+    ]
+    write_atomically(path, _csv(TRUTH_HEADER, rows))
+
+
+def read_truth(path: Path) -> Truth:
+    """A file of truth.
+
+    Raises:
+        DatasetError: naming the line that is none.
+    """
+    rows = _rows(path, TRUTH_HEADER)
+    try:
+        table = np.array(
+            [[_number(row[k]) for k in TRUTH_HEADER[2:]] for row in rows], np.float64
+        ).reshape(len(rows), len(TRUTH_HEADER) - 2)
+        stamps = tuple(int(row['stamp_ns']) for row in rows)
+    except ValueError:
+        raise DatasetError(f'{path}: a cell is no number: delete the file and run again') from None
+    body = table[:, 4:8]
+    return Truth(stamps, table[:, :4], None if np.isnan(body).all() else body, table[:, 8])
+
+
+def _csv(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _rows(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
+    try:
+        with path.open(encoding='utf-8', newline='') as file:
+            reader = csv.DictReader(file)
+            missing = [name for name in needed if name not in (reader.fieldnames or ())]
+            if missing:
+                raise DatasetError(f'{path}, line 1: the header lacks {", ".join(missing)}')
+            return list(reader)
+    except OSError as error:
+        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+    except UnicodeDecodeError:
+        raise DatasetError(f'{path} is not a text file') from None
+
+
+def _cells(box: Box | None) -> tuple[str, ...]:
+    return ('',) * 4 if box is None else tuple(f'{v:.3f}' for v in box.as_tuple())
+
+
+def _number(text: str | None) -> float:
+    return float(text) if text else math.nan
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (np.integer, np.floating)):
+        value = value.item()
+    if isinstance(value, float):
+        return round(value, 6) if math.isfinite(value) else None
+    return value
