@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from heapq import merge
 from pathlib import Path
 from typing import Any, cast
@@ -99,15 +99,18 @@ class RawBag:
                 f'{error or type(error).__name__}'
             ) from None
 
-    def in_order(self) -> Iterator[tuple[Topic, int]]:
-        """All messages of all topics by time of recording: topic and number in it."""
-        streams = [
-            ((log_ns, number, index) for index, log_ns in enumerate(topic.log_ns))
-            for number, topic in enumerate(self.topics.values())
-        ]
-        topics = list(self.topics.values())
-        for _, number, index in merge(*streams):
-            yield topics[number], index
+    def in_order(self, names: Collection[str] | None = None) -> Iterator[tuple[Topic, int]]:
+        """Messages by time of recording, those of one time by their place in the file.
+
+        Args:
+            names: of the topics wanted; None for all.
+
+        Yields:
+            Topic, and number of the message in it.
+        """
+        chosen = [t for t in self.topics.values() if names is None or t.name in names]
+        for _, _, number, index in merge(*(_by_time(n, t) for n, t in enumerate(chosen))):
+            yield chosen[number], index
 
     def _scan(self) -> dict[str, Topic]:
         topics: dict[str, Topic] = {}
@@ -191,6 +194,11 @@ class RawBag:
             cast(Any, type(self._storages[0]))
         ]
         return f'rosbag2 folder ({kind})' if self.path.is_dir() else kind
+
+
+def _by_time(number: int, topic: Topic) -> Iterator[tuple[int, tuple[int, ...], int, int]]:
+    for index, log_ns in enumerate(topic.log_ns):
+        yield log_ns, tuple(topic.places[4 * index : 4 * index + 3]), number, index
 
 
 def _open_storage(path: Path) -> Storage:

@@ -1,0 +1,117 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which colour images a tracker must still answer, and how long each answer took.
+
+A tracker answers each pair of colour and depth with one message that carries the colour image's
+stamp. In lock-step the next message waits until nothing is left to answer, so no queue on the way
+ever overflows and a run does not depend on the machine's speed.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable
+
+from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S, Pair, StampPairer
+
+REMEMBERED = 1024
+"""Answers that are waited for at most when nobody answers at all."""
+
+
+class Answers:
+    """Matches what was sent with what came back. Safe to use from several threads.
+
+    Pairs are decided by the tracker's own :class:`StampPairer`: a pair of unequal stamps is known
+    to be one only when later images have come, and to wait for its answer earlier would be to wait
+    for ever.
+
+    Args:
+        has_depth: without a depth topic each colour image is answered alone.
+        tolerance_s: largest difference between the stamps of a pair, as the tracker has it.
+        now: the wall clock in seconds, monotonic.
+
+    Attributes:
+        pairs: how many answers were due so far.
+        latencies_s: from the sending of the colour image to its answer, one per answer.
+        unanswered: answers that were given up.
+    """
+
+    def __init__(
+        self,
+        has_depth: bool,
+        tolerance_s: float = DEFAULT_TOLERANCE_S,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._has_depth = has_depth
+        self._pairer: StampPairer[float, None] = StampPairer(tolerance_s)
+        self._now = now
+        self._changed = threading.Condition()
+        self._due: dict[int, float] = {}
+        self._early: dict[int, float] = {}
+        self.pairs = 0
+        self.latencies_s: list[float] = []
+        self.unanswered = 0
+
+    def sent_color(self, stamp_ns: int) -> None:
+        """A colour image is about to go out."""
+        with self._changed:
+            if self._has_depth:
+                self._expect(self._pairer.add_color(stamp_ns, self._now()))
+            else:
+                self._expect([Pair(stamp_ns, self._now(), None, None)])
+
+    def sent_depth(self, stamp_ns: int) -> None:
+        """A depth image is about to go out."""
+        with self._changed:
+            self._expect(self._pairer.add_depth(stamp_ns, None))
+
+    def sent_all(self) -> None:
+        """Nothing more will come: images without a partner are answered alone."""
+        with self._changed:
+            self._expect(self._pairer.flush())
+
+    def answered(self, stamp_ns: int) -> None:
+        """The tracker has answered the colour image of this stamp."""
+        with self._changed:
+            sent = self._due.pop(stamp_ns, None)
+            if sent is not None:
+                self.latencies_s.append(self._now() - sent)
+                self._changed.notify_all()
+            else:
+                # The tracker may decide sooner, when the depth image never arrived.
+                self._early[stamp_ns] = self._now()
+                while len(self._early) > REMEMBERED:
+                    del self._early[next(iter(self._early))]
+
+    def wait(self, timeout_s: float, stop: threading.Event) -> bool:
+        """Wait until everything due is answered; False after ``timeout_s`` or when stopped."""
+        deadline = self._now() + timeout_s
+        with self._changed:
+            while self._due:
+                left = deadline - self._now()
+                if left <= 0 or stop.is_set():
+                    return False
+                self._changed.wait(min(left, 0.1))
+        return True
+
+    def give_up(self) -> list[int]:
+        """Wait no longer for what is unanswered; returns its stamps."""
+        with self._changed:
+            stamps = list(self._due)
+            self._due.clear()
+            self.unanswered += len(stamps)
+            return stamps
+
+    def _expect(self, pairs: Iterable[Pair[float, None]]) -> None:
+        for pair in pairs:
+            self.pairs += 1
+            answered_at = self._early.pop(pair.stamp_ns, None)
+            if answered_at is not None and answered_at >= pair.color:
+                self.latencies_s.append(answered_at - pair.color)
+                continue
+            self._due[pair.stamp_ns] = pair.color
+            while len(self._due) > REMEMBERED:
+                del self._due[next(iter(self._due))]
+                self.unanswered += 1

@@ -1,0 +1,269 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The replay node: a recording on the wire, as if its camera were there."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PolygonStamped
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.parameters import checked, describe
+from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
+from rgbd_kcf_tracker.ros.parameters import ROS_NAMES, descriptor
+from rgbd_kcf_tracker.ros.replay_lockstep import Answers
+from rgbd_kcf_tracker.ros.replay_message import Message
+from rgbd_kcf_tracker.ros.replay_pacing import Pacer
+from rgbd_kcf_tracker.ros.replay_player import Player
+from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
+from rgbd_kcf_tracker.ros.replay_source import ReplaySource
+
+SETTLE_S = 0.3
+"""From the moment that both sides know of each other to the first image: discovery is one-sided."""
+NEWS_PERIOD_S = 5.0
+
+
+class ReplayNode(Node):
+    """Publishes a recording; all that it is told is read when it starts.
+
+    Raises:
+        ParameterError: for a parameter that is unknown, of the wrong type or out of range.
+    """
+
+    def __init__(self) -> None:
+        super().__init__('replay')
+        self.parameters = self._read_parameters()
+        self._publishers_by_topic: dict[str, Any] = {}
+        self._clock_publisher: Any = None
+        self._answers: Answers | None = None
+        if self.parameters.clock:
+            qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+            self._clock_publisher = self.create_publisher(Clock, '/clock', qos)
+
+    def _read_parameters(self) -> ReplayParameters:
+        # An override of the wrong type or out of range would end in rclpy's traceback, so rclpy is
+        # kept from applying them. It offers no public view of them.
+        overrides: dict[str, Parameter] = dict(getattr(self, '_parameter_overrides', {}))
+        infos = {info.name: info for info in describe(ReplayParameters)}
+        unknown = [n for n in overrides if n not in infos and not n.startswith(ROS_NAMES)]
+        if unknown:
+            raise ParameterError(
+                f'unknown parameter {unknown[0]!r}: choose from {", ".join(infos)}'
+            )
+        values = {}
+        for name, info in infos.items():
+            values[name] = info.default
+            if name in overrides:
+                values[name] = checked(info, overrides[name].value)
+            described = descriptor(info)
+            described.read_only = True
+            self.declare_parameter(name, values[name], described, ignore_override=True)
+        return ReplayParameters(**values)  # type: ignore[arg-type]
+
+    def run(self, stop: threading.Event) -> None:
+        """Replay as the parameters say; returns at the end or soon after ``stop`` is set.
+
+        Raises:
+            RecordingError: where the recording cannot be opened or read, or holds no messages.
+            ParameterError: where nobody listens in lock-step, or a topic is not in the recording.
+        """
+        parameters = self.parameters
+        if not parameters.bag:
+            raise ParameterError('no recording given: set the parameter bag, as in -p bag:=FILE')
+        with ReplaySource(Path(parameters.bag), parameters) as source:
+            for warning in source.warnings:
+                self.get_logger().warning(warning)
+            self._advertise(source)
+            answers = Answers(source.depth_topic is not None, parameters.pair_tolerance)
+            if parameters.answer_topic and source.color_topic is not None:
+                self._answers = answers
+                self.create_subscription(
+                    PolygonStamped, parameters.answer_topic, self._on_answer, QoSProfile(depth=100)
+                )
+            elif parameters.lockstep:
+                raise ParameterError(
+                    f'lockstep needs an answer_topic and a colour topic in {parameters.bag}'
+                )
+            self._await_subscribers(source, stop)
+            self._play(source, answers, stop)
+
+    def _advertise(self, source: ReplaySource) -> None:
+        parameters = self.parameters
+        for topic in source.topics:
+            kind = message_class(topic.type)
+            if kind is None:
+                self.get_logger().warning(
+                    f'{topic.name} is not replayed: {topic.type} is not installed'
+                )
+                continue
+            qos = QoSProfile(depth=parameters.qos_depth)
+            if parameters.reliability == 'best_effort':
+                qos.reliability = ReliabilityPolicy.BEST_EFFORT
+            if topic.name.endswith('/tf_static'):
+                qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
+            self._publishers_by_topic[topic.name] = self.create_publisher(kind, topic.name, qos)
+        if not self._publishers_by_topic:
+            raise RecordingError(f'{parameters.bag} holds no topic that can be replayed')
+
+    def _on_answer(self, message: PolygonStamped) -> None:
+        if self._answers is not None:
+            self._answers.answered(stamp_to_ns(message.header.stamp))
+
+    def _await_subscribers(self, source: ReplaySource, stop: threading.Event) -> None:
+        """Wait until the images are heard, and in lock-step until the tracker can answer."""
+        parameters = self.parameters
+        names = [n for n in (source.color_topic, source.depth_topic) if n is not None]
+        publishers = [self._publishers_by_topic[n] for n in names if n in self._publishers_by_topic]
+        if not publishers:
+            publishers = list(self._publishers_by_topic.values())[:1]
+
+        def heard() -> bool:
+            if not all(p.get_subscription_count() for p in publishers):
+                return False
+            return not parameters.lockstep or bool(self.count_publishers(parameters.answer_topic))
+
+        topics = ', '.join(p.topic_name for p in publishers)
+        deadline = time.monotonic() + parameters.wait_for_subscribers
+        news = time.monotonic() + 1.0
+        while not heard():
+            now = time.monotonic()
+            if now >= deadline:
+                if parameters.lockstep:
+                    raise ParameterError(
+                        f'nobody subscribes to {topics} and answers on {parameters.answer_topic}: '
+                        'start the tracker with its inputs remapped to these topics'
+                    )
+                if parameters.wait_for_subscribers:
+                    self.get_logger().warning(f'nobody subscribes to {topics}: playing anyway')
+                return
+            if now >= news:
+                self.get_logger().info(f'waiting for a subscriber to {topics}')
+                news = now + NEWS_PERIOD_S
+            if stop.wait(0.02):
+                return
+        stop.wait(SETTLE_S)
+
+    def _play(self, source: ReplaySource, answers: Answers, stop: threading.Event) -> None:
+        parameters = self.parameters
+        player = Player(
+            self._send,
+            Pacer(0.0 if parameters.lockstep else parameters.rate),
+            answers,
+            lockstep=parameters.lockstep,
+            answer_timeout_s=parameters.answer_timeout,
+            tick=self._tick,
+            warn=self.get_logger().warning,
+        )
+        self.get_logger().info(
+            f'replaying {source.name}: {len(source)} messages, '
+            + ', '.join(p.topic_name for p in self._publishers_by_topic.values())
+        )
+        info = source.first_info() if parameters.lockstep else None
+        if info is not None:
+            # Drivers send it with every image; a recording may hold it after the images that a
+            # tracker answers only with it.
+            self._send(info)
+        started = time.monotonic()
+        while player.play(source.messages(parameters.start), stop) and parameters.loop:
+            pass
+        if not stop.is_set():
+            # The last images may still be on their way, and their answers too.
+            for publisher in self._publishers_by_topic.values():
+                if parameters.reliability == 'reliable':
+                    publisher.wait_for_all_acked(Duration(seconds=1))
+            if self._answers is not None and self.count_publishers(parameters.answer_topic):
+                answers.wait(1.0, stop)
+        answers.give_up()
+        figures = figures_of(player, answers, time.monotonic() - started)
+        self.get_logger().info(summary(figures))
+        if parameters.report:
+            write_report(Path(parameters.report), figures)
+
+    def _send(self, message: Message) -> None:
+        publisher = self._publishers_by_topic.get(message.topic)
+        if publisher is not None:
+            publisher.publish(message.data)
+
+    def _tick(self, time_ns: int) -> None:
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(Clock(clock=stamp_from_ns(time_ns)))
+
+
+def message_class(name: str) -> Any | None:
+    """The class of a message type such as ``sensor_msgs/msg/Image``, None where not installed."""
+    package, _, rest = name.partition('/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), rest.removeprefix('msg/'))
+    except (ImportError, AttributeError, ValueError):
+        return None
+
+
+def figures_of(player: Player, answers: Answers, seconds: float) -> dict[str, Any]:
+    """The figures of a run, as the report holds them; times in milliseconds, rates in Hz."""
+    progress = player.progress
+    figures: dict[str, Any] = {
+        'messages': progress.messages,
+        'color_images': progress.colors,
+        'depth_images': progress.depths,
+        'pairs': answers.pairs,
+        'answers': len(answers.latencies_s),
+        'unanswered': answers.unanswered,
+        'sent_again': progress.repeated,
+        'rounds': progress.rounds,
+        'seconds': round(seconds, 3),
+        'rate_hz': round(progress.colors / seconds, 2) if seconds > 0 else None,
+        'latency_ms': None,
+    }
+    if answers.latencies_s:
+        milliseconds = np.asarray(answers.latencies_s) * 1e3
+        p50, p95, p99 = np.percentile(milliseconds, [50, 95, 99])
+        figures['latency_ms'] = {
+            'median': round(float(p50), 2),
+            'p95': round(float(p95), 2),
+            'p99': round(float(p99), 2),
+            'max': round(float(milliseconds.max()), 2),
+        }
+    return figures
+
+
+def summary(figures: dict[str, Any]) -> str:
+    """The figures of a run in one line."""
+    text = (
+        f'{figures["messages"]} messages in {figures["seconds"]:.1f} s, '
+        f'{figures["color_images"]} colour and {figures["depth_images"]} depth images'
+    )
+    latency = figures['latency_ms']
+    if latency is None:
+        return text + ', no answers heard'
+    return (
+        f'{text}; {figures["answers"]} of {figures["pairs"]} answered, '
+        f'latency median {latency["median"]:.1f} ms, p99 {latency["p99"]:.1f} ms'
+    )
+
+
+def write_report(path: Path, figures: dict[str, Any]) -> None:
+    """Write the figures as JSON, whole or not at all.
+
+    Raises:
+        RecordingError: where the file cannot be written.
+    """
+    part = path.with_name(path.name + '.part')
+    try:
+        part.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
+        os.replace(part, path)
+    except OSError as error:
+        raise RecordingError(f'{path} cannot be written: {error.strerror or error}') from None

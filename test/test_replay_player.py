@@ -1,0 +1,233 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Order, time and lock-step of a replay, without ROS."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.ros.prefetch import prefetched
+from rgbd_kcf_tracker.ros.replay_lockstep import Answers
+from rgbd_kcf_tracker.ros.replay_message import Message, Role
+from rgbd_kcf_tracker.ros.replay_pacing import Pacer
+from rgbd_kcf_tracker.ros.replay_player import Player
+
+MS = 1_000_000
+
+
+class HandClock:
+    """A wall clock that moves when it is told to."""
+
+    def __init__(self) -> None:
+        self.time = 100.0
+
+    def __call__(self) -> float:
+        return self.time
+
+
+def recording(pairs: int, step_ms: int = 33, skew_ms: int = 0) -> Iterator[Message]:
+    for i in range(pairs):
+        at = (1000 + i * step_ms) * MS
+        yield Message('/color', at, b'c', Role.COLOR, at)
+        yield Message('/depth', at + MS, b'd', Role.DEPTH, at + skew_ms * MS)
+        yield Message('/info', at + 2 * MS, b'i')
+
+
+def test_pacer_keeps_recorded_gaps_times_rate() -> None:
+    clock = HandClock()
+    pacer = Pacer(2.0, now=clock)
+    assert pacer.due(5_000 * MS) == 100.0
+    assert pacer.due(5_100 * MS) == pytest.approx(100.05)
+    clock.time = 100.02
+    assert pacer.due(5_200 * MS) == pytest.approx(100.1)  # the delay does not add up
+    assert pacer.recorded() == pytest.approx(5_040 * MS)
+
+
+def test_pacer_starts_anew_when_far_behind() -> None:
+    clock = HandClock()
+    pacer = Pacer(1.0, patience_s=1.0, now=clock)
+    pacer.due(0)
+    clock.time = 103.0
+    assert pacer.due(1_000 * MS) == 103.0
+    assert pacer.restarts == 1
+    assert pacer.due(1_100 * MS) == pytest.approx(103.1)
+
+
+def test_pacer_at_rate_zero_never_waits() -> None:
+    clock = HandClock()
+    pacer = Pacer(0.0, now=clock)
+    assert [pacer.due(t) for t in (0, 10**12, 5)] == [100.0] * 3
+
+
+def test_pacer_survives_time_jumping_back() -> None:
+    clock = HandClock()
+    pacer = Pacer(1.0, now=clock)
+    pacer.due(1_000_000 * MS)
+    assert pacer.due(0) == clock.time
+
+
+def test_pacer_wait_ticks_and_stops() -> None:
+    pacer = Pacer(1.0)
+    stop = threading.Event()
+    ticks: list[int] = []
+    assert pacer.wait(0, stop)
+    assert pacer.wait(60 * MS, stop, ticks.append)
+    assert 2 <= len(ticks) <= 8
+    assert ticks == sorted(ticks)
+    assert ticks[-1] <= 60 * MS
+    threading.Timer(0.05, stop.set).start()
+    began = time.monotonic()
+    assert not pacer.wait(10_000 * MS, stop)
+    assert time.monotonic() - began < 1.0
+
+
+def test_answers_of_exact_pairs() -> None:
+    clock = HandClock()
+    answers = Answers(has_depth=True, now=clock)
+    answers.sent_color(10)
+    assert answers.wait(0.0, threading.Event())  # no pair yet, nothing due
+    answers.sent_depth(10)
+    assert not answers.wait(0.0, threading.Event())
+    clock.time += 0.25
+    answers.answered(10)
+    assert answers.wait(0.0, threading.Event())
+    assert answers.latencies_s == [pytest.approx(0.25)]
+    assert (answers.pairs, answers.unanswered) == (1, 0)
+
+
+def test_answer_is_due_only_when_the_tracker_can_know_the_pair() -> None:
+    """Depth 18 ms later at 30 Hz: only the next colour image shows whose depth it is."""
+    answers = Answers(has_depth=True)
+    stop = threading.Event()
+    answers.sent_color(1000 * MS)
+    answers.sent_depth(1018 * MS)
+    answers.answered(1000 * MS)
+    answers.sent_color(1033 * MS)
+    answers.sent_depth(1051 * MS)
+    assert answers.wait(0.0, stop)
+    answers.sent_color(1066 * MS)
+    assert not answers.wait(0.0, stop)
+    # The depth of 1051 is nearer to it than to the one before, which goes out alone.
+    for stamp in (1033, 1066):
+        answers.answered(stamp * MS)
+    assert answers.wait(0.0, stop)
+    answers.sent_all()
+    assert answers.wait(0.0, stop)
+    assert answers.pairs == len(answers.latencies_s) == 3
+
+
+def test_answers_without_a_depth_topic_and_given_up() -> None:
+    answers = Answers(has_depth=False)
+    for stamp in (1, 2, 3):
+        answers.sent_color(stamp)
+    answers.answered(2)
+    assert answers.give_up() == [1, 3]
+    assert answers.unanswered == 2
+    assert answers.wait(0.0, threading.Event())
+
+
+def test_foreign_and_early_answers_do_no_harm() -> None:
+    answers = Answers(has_depth=True)
+    for stamp in range(5000):
+        answers.answered(stamp * MS + 1)
+    answers.sent_color(10 * MS)
+    answers.answered(10 * MS)  # the tracker used it without its depth
+    answers.sent_depth(10 * MS)
+    assert answers.wait(0.0, threading.Event())
+    assert len(answers.latencies_s) == 1
+
+
+def test_player_sends_everything_in_order() -> None:
+    sent: list[Message] = []
+    player = Player(sent.append, Pacer(0.0), Answers(has_depth=True))
+    assert player.play(recording(4), threading.Event())
+    assert sent == list(recording(4))
+    assert (player.progress.colors, player.progress.depths, player.progress.messages) == (4, 4, 12)
+
+
+@pytest.mark.parametrize('skew_ms', [0, 4, 18])
+def test_lockstep_never_runs_ahead_of_the_tracker(skew_ms: int) -> None:
+    """A tracker slower than the camera answers each pair before the next is complete."""
+    answers = Answers(has_depth=True)
+    waiting: list[int] = []
+    most = 0
+
+    def send(message: Message) -> None:
+        nonlocal most
+        if message.role is Role.COLOR:
+            waiting.append(message.stamp_ns)
+            most = max(most, len(waiting))
+
+            def answer() -> None:
+                waiting.remove(message.stamp_ns)
+                answers.answered(message.stamp_ns)
+
+            threading.Timer(0.01, answer).start()
+
+    player = Player(send, Pacer(0.0), answers, lockstep=True)
+    assert player.play(recording(10, skew_ms=skew_ms), threading.Event())
+    assert answers.pairs == len(answers.latencies_s) == 10
+    assert most <= (1 if skew_ms == 0 else 2)
+
+
+def test_lockstep_sends_again_what_was_lost_then_gives_up() -> None:
+    answers = Answers(has_depth=True)
+    sent: list[Message] = []
+    warnings: list[str] = []
+
+    def send(message: Message) -> None:
+        sent.append(message)
+        # The first pair is lost once; the second is never answered.
+        again = message.role is Role.DEPTH and sum(m == message for m in sent) == 2
+        if again and message.stamp_ns == 1000 * MS:
+            answers.answered(message.stamp_ns)
+
+    player = Player(
+        send, Pacer(0.0), answers, lockstep=True, answer_timeout_s=0.05, warn=warnings.append
+    )
+    assert player.play(recording(2), threading.Event())
+    assert answers.unanswered == 1
+    assert player.progress.repeated > 0
+    assert any('again' in w for w in warnings)
+    assert any('going on without' in w for w in warnings)
+
+
+def test_stop_ends_a_player_that_waits() -> None:
+    stop = threading.Event()
+    threading.Timer(0.1, stop.set).start()
+    player = Player(
+        lambda m: None, Pacer(0.0), Answers(has_depth=True), lockstep=True, answer_timeout_s=60
+    )
+    began = time.monotonic()
+    assert not player.play(recording(3), stop)
+    assert time.monotonic() - began < 1.0
+
+
+def test_prefetch_hands_over_items_then_the_error() -> None:
+    def broken() -> Iterator[int]:
+        yield 1
+        yield 2
+        raise RecordingError('cut off')
+
+    with prefetched(broken()) as items:
+        assert [next(items), next(items)] == [1, 2]
+        with pytest.raises(RecordingError, match='cut off'):
+            next(items)
+
+
+def test_prefetch_ends_its_thread_when_left_early() -> None:
+    def endless() -> Iterator[int]:
+        n = 0
+        while True:
+            yield n
+            n += 1
+
+    with prefetched(endless(), ahead=2) as items:
+        assert next(items) == 0
+    assert not any(t.name == 'prefetch' for t in threading.enumerate())
