@@ -9,9 +9,8 @@
 ...     use(simulated.frame, simulated.visible)  # doctest: +SKIP
 """
 
+from rgbd_kcf_tracker.simulation.build import check_request, kinect2_intrinsics, simulate
 from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence
-from rgbd_kcf_tracker.simulation.simulate import kinect2_intrinsics
-from rgbd_kcf_tracker.simulation.simulate import simulate as simulate
 from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario
 
 __all__ = [
@@ -19,6 +18,7 @@ __all__ = [
     'Scenario',
     'SimulatedFrame',
     'SimulatedSequence',
+    'check_request',
     'kinect2_intrinsics',
     'simulate',
 ]

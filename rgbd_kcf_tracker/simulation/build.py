@@ -29,6 +29,28 @@ def kinect2_intrinsics(size: tuple[int, int]) -> Intrinsics:
     return Intrinsics(focal, focal, (size[0] - 1) / 2, (size[1] - 1) / 2)
 
 
+def check_request(
+    scenario: str, seed: int, rate_hz: float, duration_s: float | None, size: tuple[int, int]
+) -> None:
+    """Check the arguments of `simulate`.
+
+    Raises:
+        ParameterError: where a name is unknown or a number out of range.
+    """
+    if scenario not in SCENARIOS:
+        raise ParameterError(
+            f'unknown scenario {scenario!r}: choose one of {", ".join(sorted(SCENARIOS))}'
+        )
+    if seed < 0:
+        raise ParameterError(f'seed is {seed}: give a number of 0 or above')
+    if not (math.isfinite(rate_hz) and 0.1 <= rate_hz <= 1000):
+        raise ParameterError(f'rate is {rate_hz:g} Hz: give 0.1 to 1000')
+    if duration_s is not None and not (math.isfinite(duration_s) and 0 < duration_s <= 3600):
+        raise ParameterError(f'duration is {duration_s:g} s: give above 0 and at most 3600')
+    if not (64 <= size[0] <= 4096 and 48 <= size[1] <= 4096):
+        raise ParameterError(f'size is {size[0]}x{size[1]}: give 64x48 to 4096x4096')
+
+
 def simulate(
     scenario: str, seed: int = 0, rate_hz: float = 30.0, duration_s: float | None = None,
     size: tuple[int, int] = QHD,
@@ -46,18 +68,7 @@ def simulate(
     Raises:
         ParameterError: where a name is unknown or a number out of range.
     """
-    if scenario not in SCENARIOS:
-        raise ParameterError(
-            f'unknown scenario {scenario!r}: choose one of {", ".join(sorted(SCENARIOS))}'
-        )
-    if seed < 0:
-        raise ParameterError(f'seed is {seed}: give a number of 0 or above')
-    if not (math.isfinite(rate_hz) and 0.1 <= rate_hz <= 1000):
-        raise ParameterError(f'rate is {rate_hz:g} Hz: give 0.1 to 1000')
-    if duration_s is not None and not (math.isfinite(duration_s) and 0 < duration_s <= 3600):
-        raise ParameterError(f'duration is {duration_s:g} s: give above 0 and at most 3600')
-    if not (64 <= size[0] <= 4096 and 48 <= size[1] <= 4096):
-        raise ParameterError(f'size is {size[0]}x{size[1]}: give 64x48 to 4096x4096')
+    check_request(scenario, seed, rate_hz, duration_s, size)
     camera = kinect2_intrinsics(size)
     rng = np.random.default_rng([seed, zlib.crc32(scenario.encode())])
     scene = SCENARIOS[scenario].build(Stage(rng, camera, size))
