@@ -29,7 +29,8 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import Bool, Header
 
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.ros.messages import box_from_polygon, image_message, stamp_from_ns
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon
+from rgbd_kcf_tracker.ros.messages import image_message, stamp_from_ns
 from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
 
@@ -163,7 +164,7 @@ class Rig:
             time.sleep(0.002)
 
     def box(self, at: int = -1) -> Box | None:
-        return box_from_polygon(self.boxes[at])
+        return box_from_polygon(self.boxes[at].polygon.points)
 
     def values(self) -> dict[str, str]:
         """Key values of the last diagnostics, with its sentence and level."""

@@ -30,7 +30,7 @@ from std_srvs.srv import Trigger
 from rgbd_kcf_tracker import Frame, Intrinsics, create_tracker
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.images import metres_from_mm
-from rgbd_kcf_tracker.ros.messages import box_from_polygon, stamp_to_ns
+from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 from rgbd_kcf_tracker.trackers import VARIANTS
 
 pytestmark = pytest.mark.ros
@@ -161,6 +161,8 @@ def test_every_pair_at_30_hz(rig: Rig) -> None:
         rig.wait(lambda: len(rig.boxes) == count, what='all boxes')
         values = rig.fresh_values()
     assert [stamp_to_ns(m.header.stamp) for m in rig.boxes] == [stamp_of(i) for i in range(count)]
-    assert all(box_from_polygon(m).iou(scene(i)[2]) > 0.6 for i, m in enumerate(rig.boxes))
+    assert all(
+        box_from_polygon(m.polygon.points).iou(scene(i)[2]) > 0.6 for i, m in enumerate(rig.boxes)
+    )
     assert int(values['processed']) == count
     assert int(values.get('dropped', 0)) == 0

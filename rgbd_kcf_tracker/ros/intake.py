@@ -16,11 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.images import as_bytes
 from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
-from rgbd_kcf_tracker.ros.processor import Capture
+from rgbd_kcf_tracker.ros.processor import Camera, Capture
 from rgbd_kcf_tracker.ros.statistics import Statistics
 
 MISSES = 3
@@ -86,7 +85,12 @@ class Intake:
         patient: bool,
     ) -> None:
         self._statistics = statistics
-        self._pairer = LivePairer(tolerance_s)
+        # As recordings are paired where every pair counts: stamps alone decide, not the rate.
+        self._pairer = (
+            LivePairer(tolerance_s, capacity=1000, max_wait_s=60.0)
+            if patient
+            else LivePairer(tolerance_s)
+        )
         self._wait_ns = round(depth_wait_s * 1e9)
         self._info_wait_ns = round(camera_info_wait_s * 1e9)
         self._patient = patient
@@ -96,7 +100,7 @@ class Intake:
         self._held: deque[Capture] = deque()
         self._hold_from: int | None = None
         self._holding = True
-        self._intrinsics: Intrinsics | None = None
+        self._camera: Camera | None = None
         self.info_expected = True
         self.depth_expected = True
 
@@ -105,9 +109,9 @@ class Intake:
         """Whether nothing waits, so that :meth:`poll` has nothing to do."""
         return not self._arrivals and not self._held
 
-    def camera_info(self, intrinsics: Intrinsics, arrival_ns: int) -> list[Capture]:
+    def camera_info(self, camera: Camera, arrival_ns: int) -> list[Capture]:
         """Take in what the camera says of itself; returns what waited for it."""
-        self._intrinsics = intrinsics
+        self._camera = camera
         return self._release_held(arrival_ns)
 
     def color(self, message: Any, arrival_ns: int) -> list[Capture]:
@@ -159,7 +163,7 @@ class Intake:
             if pair.depth is None:
                 self._misses += 1
                 self._statistics.count('color_without_depth')
-            captures.append(Capture(pair.color, pair.depth, self._intrinsics, now_ns))
+            captures.append(Capture(pair.color, pair.depth, self._camera, now_ns))
         self._forget_lost()
         counts = self._pairer.counts
         self._statistics.set('late', counts.late)
@@ -179,7 +183,7 @@ class Intake:
         """Keep the first captures until there are intrinsics, as long as that is worth it."""
         if not captures:
             return captures
-        if self._intrinsics is not None or not (self.info_expected or self._patient):
+        if self._camera is not None or not (self.info_expected or self._patient):
             return self._release_held(now_ns) + captures
         if self._hold_from is None:
             self._hold_from = now_ns
@@ -193,7 +197,7 @@ class Intake:
 
     def _release_held(self, now_ns: int) -> list[Capture]:
         self._holding = False
-        held = [Capture(c.color, c.depth, self._intrinsics, now_ns) for c in self._held]
+        held = [Capture(c.color, c.depth, self._camera, now_ns) for c in self._held]
         self._held.clear()
         return held
 

@@ -3,8 +3,9 @@
 
 """Between ROS messages and our types: nothing here knows of nodes or topics.
 
-Image decoding is not here: the recordings and the node share
-:mod:`rgbd_kcf_tracker.recordings.images`, so that a bag and a live camera give the same frames.
+Reading images and cameras is not here: the recordings and the node share
+:mod:`rgbd_kcf_tracker.recordings.images` and :mod:`rgbd_kcf_tracker.recordings.messages`, so that a
+bag and a live camera give the same frames.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Point32, PointStamped, PolygonStamped
-from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
+from sensor_msgs.msg import Image, RegionOfInterest
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
@@ -75,19 +76,6 @@ def polygon_from_box(header: Header, box: Box | None) -> PolygonStamped:
             )
         ]
     return message
-
-
-def box_from_polygon(message: PolygonStamped) -> Box | None:
-    """The box of a message of ``~/box``, None where it has no points.
-
-    Raises:
-        BoxError: where the points are no box.
-    """
-    points = message.polygon.points
-    if not points:
-        return None
-    xs, ys = [p.x for p in points], [p.y for p in points]
-    return Box.from_corners(min(xs), min(ys), max(xs), max(ys))
 
 
 def position_from_track(header: Header, track: Track) -> PointStamped | None:
@@ -152,18 +140,6 @@ def detections_from_track(types: Any, header: Header, track: Track, class_id: st
     detection.results = [result]
     message.detections = [detection]
     return message
-
-
-def intrinsics_from_info(info: CameraInfo) -> Intrinsics:
-    """The pinhole camera of a ``sensor_msgs/CameraInfo``: its K, or its P where K is empty.
-
-    Raises:
-        ParameterError: where neither is a camera.
-    """
-    k, p = [float(v) for v in info.k], [float(v) for v in info.p]
-    if k[0] == 0 and p[0] != 0:
-        return Intrinsics(p[0], p[5], p[2], p[6])
-    return Intrinsics(k[0], k[4], k[2], k[5])
 
 
 def image_message(header: Header, image: npt.NDArray[Any], encoding: str) -> Image:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
@@ -30,6 +30,14 @@ from rgbd_kcf_tracker.ros.timeline import Moment, Timeline
 from rgbd_kcf_tracker.trackers import VARIANTS, Track, TrackState
 
 
+class Camera(NamedTuple):
+    """What camera_info says: intrinsics, and the image size they are for (zeros: any)."""
+
+    intrinsics: Intrinsics
+    width: int
+    height: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Capture:
     """A colour message, its depth message if it has one, and when the pair was complete.
@@ -37,13 +45,13 @@ class Capture:
     Attributes:
         color: ``sensor_msgs/Image`` or ``CompressedImage``.
         depth: likewise, or None.
-        intrinsics: the camera's as known at that time, or None.
+        camera: as known at that time, or None.
         arrival_ns: on the monotonic clock.
     """
 
     color: Any
     depth: Any | None
-    intrinsics: Intrinsics | None
+    camera: Camera | None
     arrival_ns: int
 
 
@@ -135,7 +143,21 @@ class Processor:
         depth: DepthImage | None = None
         if capture.depth is not None and self._depth_wanted():
             depth = self._readable_depth(capture.depth, color)
-        return Frame(color, depth, time_ns, capture.intrinsics)
+        return Frame(color, depth, time_ns, self._fitting(capture.camera, color))
+
+    def _fitting(self, camera: Camera | None, color: ColorImage) -> Intrinsics | None:
+        """The intrinsics, if they are for images of this size."""
+        if camera is None:
+            return None
+        height, width = color.shape[:2]
+        if camera.width and camera.height and (camera.width, camera.height) != (width, height):
+            self._fault(
+                'bad_camera_info',
+                f'camera_info is for {camera.width}x{camera.height} images but these are '
+                f'{width}x{height}: it is left out',
+            )
+            return None
+        return camera.intrinsics
 
     def _depth_wanted(self) -> bool:
         uses = VARIANTS[self.session.variant].uses_depth

@@ -23,11 +23,12 @@ from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info, is_rectified
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.intake import Intake
-from rgbd_kcf_tracker.ros.messages import box_from_roi, intrinsics_from_info
+from rgbd_kcf_tracker.ros.messages import box_from_roi
 from rgbd_kcf_tracker.ros.parameters import ParameterServer
-from rgbd_kcf_tracker.ros.processor import Capture, Processor
+from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
 from rgbd_kcf_tracker.ros.publishers import TrackPublishers
 from rgbd_kcf_tracker.ros.session import Choice, Session
 from rgbd_kcf_tracker.ros.settings import ALL, RESTART, NodeParameters, parse_box
@@ -199,11 +200,14 @@ class TrackerNode(LifecycleNode):
         if self._intake is None:
             return
         try:
-            intrinsics = intrinsics_from_info(message)
+            rectified = self._inputs is not None and is_rectified(self._inputs.topic(COLOR))
+            intrinsics = intrinsics_from_info(message, rectified)
         except RgbdKcfError as error:
             self._fault('bad_camera_info', f'camera_info cannot be used: {error}')
             return
-        self._hand_over(self._intake.camera_info(intrinsics, time.monotonic_ns()))
+        if intrinsics is not None:
+            camera = Camera(intrinsics, int(message.width), int(message.height))
+            self._hand_over(self._intake.camera_info(camera, time.monotonic_ns()))
 
     def _poll(self) -> None:
         if self._intake is not None:
