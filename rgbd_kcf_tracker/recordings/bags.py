@@ -31,12 +31,12 @@ from rgbd_kcf_tracker.recordings.images import (
 from rgbd_kcf_tracker.recordings.messages import (
     box_from_polygon,
     intrinsics_from_info,
-    is_rectified,
 )
 from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S, Pair, StampPairer
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
+from rgbd_kcf_tracker.recordings.textfiles import known
 from rgbd_kcf_tracker.recordings.topics import ChosenTopics, ImageTopic, choose_topics
 
 TRUTH_TOPICS = ('/groundtruth/visible', '/groundtruth/body')
@@ -72,7 +72,7 @@ class BagRecording:
             self._pairs = self._pair(options)
             self.intrinsics = options.intrinsics or self._read_intrinsics()
             self.groundtruth = self._read_truth(TRUTH_TOPICS[0])
-            self.groundtruth_body = self._read_truth(TRUTH_TOPICS[1])
+            self.groundtruth_body = known(self._read_truth(TRUTH_TOPICS[1]))
         except BaseException:
             self.bag.close()
             raise
@@ -245,7 +245,7 @@ class BagRecording:
         size = next(i.size for i in self._images if i.name == self.topics.color)
         try:
             msg = self.bag.message(topic, 0)
-            found = intrinsics_from_info(msg, is_rectified(self.topics.color))
+            found = intrinsics_from_info(msg)
         except RgbdKcfError as error:
             self.warnings.append(f'{topic.name}: {error}')
             return None

@@ -11,15 +11,15 @@ from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 
-def intrinsics_from_info(msg: Any, rectified: bool = False) -> Intrinsics | None:
+def intrinsics_from_info(msg: Any) -> Intrinsics | None:
     """The pinhole camera of a ``sensor_msgs/CameraInfo``.
 
     Args:
         msg: with ``k`` and ``p`` (ROS 2) or ``K`` and ``P`` (ROS 1).
-        rectified: the images are rectified, so that ``P`` holds; ``K`` where it is all zero.
 
     Returns:
-        The intrinsics; None for an uncalibrated camera, whose matrices are zero.
+        The intrinsics in ``K``, or in ``P`` where that is zero; None for an uncalibrated camera,
+        where both are.
 
     Raises:
         ImageError: where the numbers are no camera (negative, infinite, too few).
@@ -31,20 +31,13 @@ def intrinsics_from_info(msg: Any, rectified: bool = False) -> Intrinsics | None
         from_p = tuple(float(p[i]) for i in (0, 5, 2, 6))
     except (IndexError, TypeError, ValueError):
         raise ImageError('camera_info has no 3x3 K and 3x4 P: leave it out or calibrate') from None
-    values = from_p if rectified and from_p[0] and from_p[1] else from_k
-    if not values[0] and not values[1]:
-        values = from_p
+    values = from_k if from_k[0] or from_k[1] else from_p
     if not values[0] and not values[1]:
         return None
     try:
         return Intrinsics(*values)
     except RgbdKcfError as error:
         raise ImageError(f'camera_info is no camera: {error}') from None
-
-
-def is_rectified(topic: str) -> bool:
-    """Whether a topic's name says that its images are rectified, as drivers do by ``rect``."""
-    return 'rect' in topic.rpartition('/')[2] or '_rect/' in topic
 
 
 def box_from_polygon(points: Any) -> Box | None:

@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.recordings.images import (
 )
 from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
 from rgbd_kcf_tracker.recordings.textfiles import (
+    known,
     natural_key,
     read_boxes,
     read_intrinsics,
@@ -65,7 +66,7 @@ class SequenceFolder:
         if self.intrinsics is None and (path / 'intrinsics.json').exists():
             self.intrinsics = read_intrinsics(path / 'intrinsics.json')
         self.groundtruth = self._read_truth('groundtruth.txt')
-        self.groundtruth_body = self._read_truth('groundtruth_body.txt')
+        self.groundtruth_body = known(self._read_truth('groundtruth_body.txt'))
 
     def __len__(self) -> int:
         return len(self._colors)

@@ -50,6 +50,11 @@ def read_boxes(path: Path) -> list[Box | None]:
     return boxes
 
 
+def known(boxes: list[Box | None] | None) -> list[Box | None] | None:
+    """``boxes``, or None where not one is there: then nobody measured them."""
+    return boxes if boxes is not None and any(b is not None for b in boxes) else None
+
+
 def format_box(box: Box | None) -> str:
     """``box`` as a line of a ground-truth file, in thousandths of a pixel.
 

@@ -1,0 +1,180 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Frames, tracks and truth as a bag that RViz, Foxglove and our own nodes read."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import track_messages as make
+from rgbd_kcf_tracker.recordings.encoding import (
+    encode_color,
+    encode_compressed_color,
+    encode_depth,
+)
+from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, types
+from rgbd_kcf_tracker.recordings.overlay import draw_track
+from rgbd_kcf_tracker.trackers.track import Track
+
+TRUTH_VISIBLE, TRUTH_BODY = '/groundtruth/visible', '/groundtruth/body'
+
+
+@dataclass(frozen=True, slots=True)
+class CameraTopics:
+    """Names under which a camera's images are written.
+
+    Attributes:
+        color, depth, info: topics of colour image, depth image and CameraInfo.
+        frame_id: coordinate frame of the images.
+    """
+
+    color: str
+    depth: str
+    info: str
+    frame_id: str
+
+    @classmethod
+    def kinect2(cls, resolution: str) -> CameraTopics:
+        """kinect2_bridge's names; resolution 'hd', 'qhd' or 'sd'."""
+        base = f'/kinect2/{resolution}'
+        kind = 'ir' if resolution == 'sd' else 'rgb'
+        return cls(
+            f'{base}/image_color_rect',
+            f'{base}/image_depth_rect',
+            f'{base}/camera_info',
+            f'kinect2_{kind}_optical_frame',
+        )
+
+
+KINECT2_HD = CameraTopics.kinect2('hd')
+KINECT2_QHD = CameraTopics.kinect2('qhd')
+KINECT2_SD = CameraTopics.kinect2('sd')
+GENERIC = CameraTopics('/color/image', '/depth/image', '/color/camera_info', 'camera_optical_frame')
+"""The tracker node's own names: a bag with these needs no remapping."""
+
+
+class BagWriter:
+    """Writes mcap: images as a camera sends them, and the tracker's topics beside them.
+
+    Every message's time of recording is its frame's stamp. What was written before an interruption,
+    kill -9 included, stays readable: it is a file without index, which ``convert`` mends.
+
+    Args:
+        path: the file; missing folders are made.
+        topics: names of the images.
+        tracker: prefix of the tracker's topics.
+        depth_encoding: 16UC1 (millimetres) or 32FC1 (metres).
+        compression: of the chunks: none, lz4 or zstd.
+        annotate: write ``image_annotated/compressed`` with each track, too.
+
+    Raises:
+        RecordingError: where it cannot be written.
+        ParameterError: for an unknown compression or depth encoding.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        topics: CameraTopics = KINECT2_QHD,
+        *,
+        tracker: str = '/tracker',
+        depth_encoding: str = '16UC1',
+        compression: str = 'none',
+        annotate: bool = False,
+    ) -> None:
+        if depth_encoding not in ('16UC1', '32FC1'):
+            raise ParameterError(f'depth encoding is {depth_encoding!r}: choose 16UC1 or 32FC1')
+        self.topics = topics
+        self._tracker = tracker.rstrip('/')
+        self._depth_encoding = depth_encoding
+        self._annotate = annotate
+        self._writer = McapWriter(path, compression)
+
+    def write_frame(self, frame: Frame) -> None:
+        """Write colour, depth where there is, and CameraInfo where intrinsics are known."""
+        header = self._header(frame)
+        if frame.intrinsics is not None:
+            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            self._writer.write(self.topics.info, info, frame.stamp_ns)
+        self._write_image(self.topics.color, header, frame, encode_color(frame.color))
+        if frame.depth is not None:
+            image = encode_depth(frame.depth, self._depth_encoding)
+            self._write_image(self.topics.depth, header, frame, image)
+
+    def write_track(self, frame: Frame, track: Track) -> None:
+        """Write what the tracker node publishes: box and occluded; roi, position, marker if any."""
+        header, stamp = self._header(frame), frame.stamp_ns
+        self._write_tracker('box', make.polygon(header, track.box), stamp)
+        self._write_tracker('occluded', types()['std_msgs/msg/Bool'](track.occluded), stamp)
+        roi = make.region(track, frame.width, frame.height)
+        if roi is not None:
+            self._write_tracker('roi', roi, stamp)
+        point = make.position(header, track)
+        if point is not None:
+            self._write_tracker('position', point, stamp)
+        self._write_tracker('marker', make.marker(header, track, frame.intrinsics), stamp)
+        if self._annotate:
+            packed = encode_compressed_color(draw_track(frame.color, track), quality=80)
+            image = types()['sensor_msgs/msg/CompressedImage'](header, packed.format, packed.data)
+            self._write_tracker('image_annotated/compressed', image, stamp)
+
+    def write_truth(self, frame: Frame, visible: Box | None, body: Box | None = None) -> None:
+        """Write the true box of the visible part, and the whole body's where there is one.
+
+        A message without points says that the target is absent.
+        """
+        header = self._header(frame)
+        self._writer.write(TRUTH_VISIBLE, make.polygon(header, visible), frame.stamp_ns)
+        self._writer.write(TRUTH_BODY, make.polygon(header, body), frame.stamp_ns)
+
+    def close(self) -> None:
+        """Write the index and close the file."""
+        self._writer.close()
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _header(self, frame: Frame) -> Any:
+        return make.header(frame.stamp_ns, self.topics.frame_id)
+
+    def _write_tracker(self, name: str, message: Any, stamp: int) -> None:
+        self._writer.write(f'{self._tracker}/{name}', message, stamp)
+
+    def _write_image(self, topic: str, header: Any, frame: Frame, image: Any) -> None:
+        message = types()['sensor_msgs/msg/Image'](
+            header,
+            image.height,
+            image.width,
+            image.encoding,
+            image.is_bigendian,
+            image.step,
+            np.ascontiguousarray(image.data),
+        )
+        self._writer.write(topic, message, frame.stamp_ns)
+
+
+def named_topics(color: str, depth: str | None, info: str | None, frame_id: str) -> CameraTopics:
+    """Topics after those of a recording, its transports taken off, generic where there are none."""
+    topics = replace(GENERIC, color=color, frame_id=frame_id or GENERIC.frame_id)
+    if depth is not None:
+        topics = replace(topics, depth=depth)
+    if info is not None:
+        topics = replace(topics, info=info)
+    return topics

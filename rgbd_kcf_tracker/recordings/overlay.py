@@ -1,0 +1,106 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The tracker's answer drawn into the picture."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.trackers.track import Track, TrackState
+
+STATE_COLORS: dict[TrackState, tuple[int, int, int]] = {
+    TrackState.IDLE: (170, 170, 170),
+    TrackState.TRACKING: (96, 222, 74),
+    TrackState.OCCLUDED: (40, 170, 255),
+    TrackState.LOST: (70, 70, 240),
+}
+"""BGR: grey, green, amber, red."""
+TRUTH_COLOR = (255, 255, 255)
+
+_FONT = cv2.FONT_HERSHEY_DUPLEX
+_BAR = 0.55  # how much of the picture the bar behind the words takes away
+
+
+def draw_track(
+    image: npt.NDArray[np.uint8],
+    track: Track,
+    *,
+    truth: Box | None = None,
+    caption: str = '',
+) -> npt.NDArray[np.uint8]:
+    """A copy of a picture with box, state, score and depth, and the true box as a thin line.
+
+    Args:
+        image: ``(H, W, 3)`` uint8 BGR; left as it is.
+        track: what the tracker says.
+        truth: the true box, where known.
+        caption: words at the right of the bar, such as the frame's number.
+
+    Returns:
+        ``(H, W, 3)`` uint8 BGR.
+    """
+    out = np.array(image, order='C')
+    color = STATE_COLORS[track.state]
+    scale = max(0.42, min(out.shape[0] / 900, out.shape[1] / 1100))
+    thickness = max(1, round(3.2 * scale))
+    if truth is not None:
+        _rectangle(out, truth, (0, 0, 0), 3)
+        _rectangle(out, truth, TRUTH_COLOR, 1)
+    if track.box is not None:
+        _rectangle(out, track.box, (0, 0, 0), thickness + 2)
+        _rectangle(out, track.box, color, thickness)
+    _bar(out, track, caption, scale, color)
+    return out
+
+
+def _bar(
+    image: npt.NDArray[np.uint8],
+    track: Track,
+    caption: str,
+    scale: float,
+    color: tuple[int, int, int],
+) -> None:
+    weight = 2 if scale > 0.8 else 1
+    (_, text_height), _ = cv2.getTextSize('Ag', _FONT, scale, weight)
+    height = min(round(text_height * 2.1), image.shape[0])
+    bar = image[:height]
+    np.multiply(bar, 1 - _BAR, out=bar, casting='unsafe')
+    baseline = round((height + text_height) / 2)
+    pad = round(text_height * 0.8)
+    cv2.circle(
+        image, (pad + text_height // 2, height // 2), text_height // 2, color, -1, cv2.LINE_AA
+    )
+    words = track.state.value
+    if track.box is not None:
+        words += f'   score {track.score:.2f}'
+    if track.depth is not None:
+        words += f'   {track.depth:.2f} m'
+    _text(image, words, (2 * pad + text_height, baseline), scale, weight)
+    (width, _), _ = cv2.getTextSize(words, _FONT, scale, weight)
+    (right, _), _ = cv2.getTextSize(caption, _FONT, scale, weight)
+    at = image.shape[1] - pad - right
+    if caption and at > 3 * pad + text_height + width:
+        _text(image, caption, (at, baseline), scale, weight)
+
+
+def _text(
+    image: npt.NDArray[np.uint8], words: str, at: tuple[int, int], scale: float, weight: int
+) -> None:
+    cv2.putText(image, words, at, _FONT, scale, (255, 255, 255), weight, cv2.LINE_AA)
+
+
+def _rectangle(
+    image: npt.NDArray[np.uint8], box: Box, color: tuple[int, int, int], thickness: int
+) -> None:
+    # Far outside the image OpenCV's fixed-point coordinates would overflow.
+    height, width = image.shape[:2]
+    shown = Box(box.x + width, box.y + height, box.width, box.height).clipped(3 * width, 3 * height)
+    if shown is None:
+        return
+    left, top = round(shown.x - width), round(shown.y - height)
+    right, bottom = round(shown.right - width) - 1, round(shown.bottom - height) - 1
+    cv2.rectangle(image, (left, top), (max(right, left), max(bottom, top)), color, thickness)
