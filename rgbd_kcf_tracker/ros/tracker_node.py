@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info, is_rectified
+from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.intake import Intake
 from rgbd_kcf_tracker.ros.messages import box_from_roi
@@ -200,8 +200,7 @@ class TrackerNode(LifecycleNode):
         if self._intake is None:
             return
         try:
-            rectified = self._inputs is not None and is_rectified(self._inputs.topic(COLOR))
-            intrinsics = intrinsics_from_info(message, rectified)
+            intrinsics = intrinsics_from_info(message)
         except RgbdKcfError as error:
             self._fault('bad_camera_info', f'camera_info cannot be used: {error}')
             return
