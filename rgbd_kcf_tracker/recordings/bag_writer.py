@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
@@ -168,13 +168,3 @@ class BagWriter:
             np.ascontiguousarray(image.data),
         )
         self._writer.write(topic, message, frame.stamp_ns)
-
-
-def named_topics(color: str, depth: str | None, info: str | None, frame_id: str) -> CameraTopics:
-    """Topics after those of a recording, its transports taken off, generic where there are none."""
-    topics = replace(GENERIC, color=color, frame_id=frame_id or GENERIC.frame_id)
-    if depth is not None:
-        topics = replace(topics, depth=depth)
-    if info is not None:
-        topics = replace(topics, info=info)
-    return topics

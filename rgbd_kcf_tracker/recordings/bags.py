@@ -61,11 +61,7 @@ class BagRecording:
         self.bag = RawBag(path)
         self.warnings: list[str] = list(self.bag.warnings)
         try:
-            self._images = [
-                look_at(self.bag, topic)
-                for topic in self.bag.topics.values()
-                if topic.type in (_IMAGE, _COMPRESSED) and len(topic)
-            ]
+            self._images = look_at_images(self.bag)
             self.topics = self._choose(options)
             self._color = self.bag.topics[self.topics.color]
             self._depth = None if self.topics.depth is None else self.bag.topics[self.topics.depth]
@@ -106,6 +102,10 @@ class BagRecording:
     def frame_id(self) -> str:
         """The coordinate frame of the colour images."""
         return str(self.bag.message(self._color, 0).header.frame_id) if len(self._color) else ''
+
+    def depth_encoding(self) -> str:
+        """Encoding of the depth images, as the message names it; '' without depth."""
+        return next((i.encoding for i in self._images if i.name == self.topics.depth), '')
 
     def info(self) -> RecordingInfo:
         """See :meth:`Recording.info`."""
@@ -279,6 +279,39 @@ class BagRecording:
         if missing:
             self.warnings.append(f'{name}: {missing} frames have no message: taken as absent')
         return [boxes.get(p.stamp_ns) for p in self._pairs[: last + 1]]
+
+
+def describe_bag(path: Path, problem: str) -> RecordingInfo:
+    """What is in a bag that gives no frames, and why it does not.
+
+    Raises:
+        RecordingError: where it is no bag or cannot be read.
+    """
+    bag = RawBag(path)
+    try:
+        logged = [t for topic in bag.topics.values() for t in topic.log_ns]
+        return RecordingInfo(
+            path=path,
+            kind=bag.kind,
+            frames=0,
+            frames_with_depth=0,
+            duration_s=(max(logged) - min(logged)) / 1e9 if logged else 0.0,
+            rate_hz=None,
+            streams=describe_streams(bag, look_at_images(bag), None),
+            problem=problem,
+            warnings=tuple(bag.warnings),
+        )
+    finally:
+        bag.close()
+
+
+def look_at_images(bag: RawBag) -> list[ImageTopic]:
+    """:func:`look_at` for every image topic with messages."""
+    return [
+        look_at(bag, topic)
+        for topic in bag.topics.values()
+        if topic.type in (_IMAGE, _COMPRESSED) and len(topic)
+    ]
 
 
 def look_at(bag: RawBag, topic: Topic) -> ImageTopic:

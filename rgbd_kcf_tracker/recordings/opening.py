@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.recording import ReadOptions, Recording
+from rgbd_kcf_tracker.recordings.recording import ReadOptions, Recording, RecordingInfo
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 
 
@@ -33,3 +33,22 @@ def open_recording(path: str | os.PathLike[str], options: ReadOptions | None = N
     from rgbd_kcf_tracker.recordings.bags import BagRecording
 
     return BagRecording(where, options)
+
+
+def describe_recording(
+    path: str | os.PathLike[str], options: ReadOptions | None = None
+) -> RecordingInfo:
+    """What is in a recording, also where its topics are not clear enough to give frames.
+
+    Raises:
+        RecordingError: where it is no recording or cannot be read.
+    """
+    try:
+        with open_recording(path, options) as recording:
+            return recording.info()
+    except RecordingError as error:
+        if not Path(path).exists() or is_sequence_folder(Path(path)):
+            raise
+        from rgbd_kcf_tracker.recordings.bags import describe_bag
+
+        return describe_bag(Path(path), str(error))

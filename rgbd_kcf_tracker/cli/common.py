@@ -1,0 +1,158 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Options and messages that several subcommands share."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, TypeVar
+
+from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.recordings import ReadOptions
+
+T = TypeVar('T')
+
+SOURCE_HELP = (
+    'a recording: an .mcap file, a rosbag2 folder (mcap or sqlite3), a ROS 1 .bag, or a sequence '
+    'folder with rgb/ and, if there is depth, depth/'
+)
+
+
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say how a recording is read."""
+    group = parser.add_argument_group('reading')
+    group.add_argument(
+        '--color-topic', metavar='TOPIC', help='colour topic of a bag (found if left out)'
+    )
+    group.add_argument(
+        '--depth-topic',
+        metavar='TOPIC',
+        help="depth topic of a bag (found if left out); 'none' reads colour alone",
+    )
+    group.add_argument(
+        '--info-topic', metavar='TOPIC', help='CameraInfo topic of a bag (found if left out)'
+    )
+    group.add_argument(
+        '--tolerance',
+        metavar='SECONDS',
+        type=float,
+        help='largest distance of stamps in a colour and depth pair (default 0.02; more, with a '
+        'warning, where no pair is that near)',
+    )
+    group.add_argument(
+        '--fps',
+        metavar='F',
+        type=float,
+        default=30.0,
+        help='frames per second of a folder without timestamps.txt (default 30)',
+    )
+    group.add_argument(
+        '--intrinsics',
+        metavar='FX,FY,CX,CY',
+        help="camera in pixels, instead of the recording's own",
+    )
+
+
+def read_options(args: argparse.Namespace) -> ReadOptions:
+    """The options of :func:`add_reading_options` as the readers take them.
+
+    Raises:
+        ParameterError: for a value that cannot be.
+    """
+    from rgbd_kcf_tracker.recordings import ReadOptions
+
+    return ReadOptions(
+        color_topic=args.color_topic,
+        depth_topic=args.depth_topic,
+        info_topic=args.info_topic,
+        tolerance_s=args.tolerance,
+        fps=args.fps,
+        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+    )
+
+
+def parse_box(text: str) -> Box:
+    """``X,Y,W,H`` as a box.
+
+    Raises:
+        BoxError: where it is none.
+    """
+    numbers = _numbers(text, 4)
+    if numbers is None:
+        raise BoxError(
+            f'--init {text!r} is no box: write X,Y,W,H in pixels, such as 300,120,80,200'
+        )
+    return Box(*numbers)
+
+
+def parse_intrinsics(text: str) -> Intrinsics:
+    """``FX,FY,CX,CY`` as intrinsics.
+
+    Raises:
+        ParameterError: where it is none.
+    """
+    numbers = _numbers(text, 4)
+    if numbers is None:
+        raise ParameterError(
+            f'--intrinsics {text!r} is no camera: '
+            'write FX,FY,CX,CY in pixels, such as 525,525,320,240'
+        )
+    return Intrinsics(*numbers)
+
+
+def parse_assignments(items: Sequence[str]) -> dict[str, str]:
+    """``key=value`` words as a mapping.
+
+    Raises:
+        ParameterError: for a word without ``=``.
+    """
+    values: dict[str, str] = {}
+    for item in items:
+        key, equals, value = item.partition('=')
+        if not equals or not key:
+            raise ParameterError(f'--param {item!r}: write key=value')
+        values[key.strip()] = value.strip()
+    return values
+
+
+def progress(items: Iterable[T], total: int | None, label: str) -> Iterable[T]:
+    """``items`` with a bar on standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        return items
+    from tqdm import tqdm
+
+    bar: Iterable[T] = tqdm(items, total=total, desc=label, unit='frame', leave=False)
+    return bar
+
+
+def warn(text: str) -> None:
+    """A warning on standard error."""
+    print(f'warning: {text}', file=sys.stderr)
+
+
+class Warnings:
+    """Prints the warnings of a recording, each once, as they come up."""
+
+    def __init__(self, warnings: list[str]) -> None:
+        self._warnings = warnings
+        self._shown = 0
+
+    def show(self) -> None:
+        """Print those that are new."""
+        for text in self._warnings[self._shown :]:
+            warn(text)
+        self._shown = len(self._warnings)
+
+
+def _numbers(text: str, count: int) -> tuple[float, ...] | None:
+    try:
+        numbers = tuple(float(word) for word in text.replace(' ', ',').split(',') if word)
+    except ValueError:
+        return None
+    return numbers if len(numbers) == count else None

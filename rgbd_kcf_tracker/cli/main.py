@@ -1,0 +1,100 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command ``rgbd-kcf``: finds the subcommand, and turns errors into messages."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import importlib.util
+import os
+import sys
+from collections.abc import Sequence
+from typing import Protocol, cast
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+
+PROGRAM = 'rgbd-kcf'
+SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'bench')
+
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130
+
+
+class Subcommand(Protocol):
+    """What the module of a subcommand offers. It imports what is heavy only in ``run``."""
+
+    NAME: str
+    HELP: str
+
+    def add_arguments(self, parser: argparse.ArgumentParser) -> None:
+        """Declare the options."""
+        ...
+
+    def run(self, args: argparse.Namespace) -> int:
+        """Do it; returns the exit code."""
+        ...
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code.
+
+    Errors that a user can mend are one message on standard error and exit code 2, Ctrl-C is 130.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    parser = _parser(arguments)
+    args = parser.parse_args(arguments)
+    try:
+        code = int(args.run(args))
+        sys.stdout.flush()
+        return code
+    except RgbdKcfError as error:
+        print(f'{PROGRAM}: error: {error}', file=sys.stderr)
+        return EXIT_USAGE
+    except KeyboardInterrupt:
+        print(f'{PROGRAM}: interrupted', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output is gone (``| head``): nothing is left to say.
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except OSError as error:
+        name = f'{error.filename}: ' if error.filename else ''
+        print(f'{PROGRAM}: error: {name}{error.strerror or error}', file=sys.stderr)
+        return EXIT_USAGE
+
+
+def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description='Follow one target in colour and depth, in recordings and benchmarks. '
+        'The live nodes are started with ros2 run or ros2 launch.',
+        allow_abbrev=False,
+    )
+    parser.add_argument('--version', action='version', version=_version())
+    commands = parser.add_subparsers(title='commands', metavar='COMMAND', required=True)
+    # With a command named, only its module is imported, which keeps the start quick.
+    named = [name for name in SUBCOMMANDS if name in arguments[:1]]
+    for name in named or SUBCOMMANDS:
+        if importlib.util.find_spec(f'rgbd_kcf_tracker.cli.{name}') is None:
+            continue
+        module = cast(Subcommand, importlib.import_module(f'rgbd_kcf_tracker.cli.{name}'))
+        sub = commands.add_parser(
+            module.NAME, help=module.HELP, description=module.HELP, allow_abbrev=False
+        )
+        module.add_arguments(sub)
+        sub.set_defaults(run=module.run)
+    return parser
+
+
+def _version() -> str:
+    from rgbd_kcf_tracker import __version__
+
+    return f'{PROGRAM} {__version__}'
+
+
+if __name__ == '__main__':
+    sys.exit(main())

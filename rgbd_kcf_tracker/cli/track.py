@@ -1,0 +1,194 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``rgbd-kcf track``: follow a target through a recording."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rgbd_kcf_tracker.cli.common import (
+    SOURCE_HELP,
+    Warnings,
+    add_reading_options,
+    parse_assignments,
+    parse_box,
+    progress,
+    read_options,
+)
+from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.frame import Frame
+    from rgbd_kcf_tracker.geometry import Box
+    from rgbd_kcf_tracker.recordings import Recording
+    from rgbd_kcf_tracker.trackers import Track, Tracker
+
+NAME = 'track'
+HELP = 'follow one target through a recording and write where it is'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.add_argument('source', metavar='SOURCE', help=SOURCE_HELP)
+    parser.add_argument(
+        '--init',
+        metavar='X,Y,W,H',
+        help="the target's box in the first frame read, in pixels from the top left corner "
+        '(default: the first ground-truth box)',
+    )
+    parser.add_argument(
+        '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
+    )
+    parser.add_argument(
+        '--param',
+        metavar='KEY=VALUE',
+        nargs='+',
+        action='extend',
+        default=[],
+        help='parameters of the tracker; an unknown name lists those there are',
+    )
+    parser.add_argument('--start', metavar='N', type=int, default=0, help='first frame (default 0)')
+    parser.add_argument('--end', metavar='N', type=int, help='frame to stop before (default: all)')
+    output = parser.add_argument_group('output')
+    output.add_argument(
+        '--output', metavar='FILE.csv', help='a row per frame; - for standard output'
+    )
+    output.add_argument('--video', metavar='FILE.mp4', help='the frames with the box drawn on them')
+    output.add_argument(
+        '--bag', metavar='FILE.mcap', help="the frames with the tracker's topics beside them"
+    )
+    add_reading_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Track, write, and print a summary."""
+    from rgbd_kcf_tracker.recordings import open_recording
+    from rgbd_kcf_tracker.trackers.track import require_inside
+
+    tracker, variant = _make_tracker(args)
+    given = None if args.init is None else parse_box(args.init)
+    _check_outputs(args)
+    with open_recording(args.source, read_options(args)) as recording:
+        start, end = _frame_range(args, recording)
+        warnings = Warnings(recording.warnings)
+        warnings.show()
+        box, first = _first_box(given, recording, start, end)
+        counts: Counter[str] = Counter()
+        spent = 0.0
+        sinks: _Sinks | None = None
+        with ExitStack() as stack:
+            frames = progress(recording.frames(start, end), end - start, NAME)
+            for number, frame in enumerate(frames, start=start):
+                if sinks is None:
+                    if number == first:
+                        require_inside(box, frame)
+                    # Opened only now, so that a box outside the image leaves no empty files.
+                    sinks = _Sinks(args, recording, stack)
+                begun = time.perf_counter()
+                track = tracker.start(frame, box) if number == first else tracker.update(frame)
+                spent += time.perf_counter() - begun
+                counts[track.state.value] += 1
+                sinks.write(number, frame, track)
+                warnings.show()
+    total = sum(counts.values())
+    rate = total / spent if spent > 0 else 0.0
+    states = ', '.join(f'{count} {state}' for state, count in counts.items())
+    line = f'{recording.name}: {total} frames with {variant}: {states}; {rate:.0f} frames/s'
+    if sinks is not None and sinks.written:
+        line += f'; wrote {", ".join(sinks.written)}'
+    print(line, file=sys.stderr if args.output == '-' else sys.stdout)
+    return 0
+
+
+class _Sinks:
+    """The outputs that were asked for, closed with ``stack``."""
+
+    def __init__(self, args: argparse.Namespace, recording: Recording, stack: ExitStack) -> None:
+        from rgbd_kcf_tracker.recordings import BagWriter, TrackCsvWriter, VideoWriter
+        from rgbd_kcf_tracker.recordings.copying import output_topics
+
+        self.truth = recording.groundtruth
+        self.body = recording.groundtruth_body
+        self.written = [p for p in (args.output, args.video, args.bag) if p and p != '-']
+        self.csv = stack.enter_context(TrackCsvWriter(args.output)) if args.output else None
+        self.video = None
+        if args.video:
+            rate = recording.info().rate_hz or args.fps
+            self.video = stack.enter_context(VideoWriter(args.video, rate))
+        self.bag = None
+        if args.bag:
+            topics, depth_encoding = output_topics(recording)
+            self.bag = stack.enter_context(
+                BagWriter(args.bag, topics, depth_encoding=depth_encoding, annotate=True)
+            )
+
+    def write(self, number: int, frame: Frame, track: Track) -> None:
+        annotated = self.truth is not None and number < len(self.truth)
+        truth = self.truth[number] if self.truth is not None and annotated else None
+        if self.csv is not None:
+            self.csv.write_track(number, frame.stamp_ns, track)
+        if self.video is not None:
+            self.video.write_track(frame, track, truth, f'frame {number}')
+        if self.bag is not None:
+            self.bag.write_frame(frame)
+            if annotated:
+                body = self.body[number] if self.body and number < len(self.body) else None
+                self.bag.write_truth(frame, truth, body)
+            self.bag.write_track(frame, track)
+
+
+def _make_tracker(args: argparse.Namespace) -> tuple[Tracker, str]:
+    from rgbd_kcf_tracker.parameters import with_overrides
+    from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, create_tracker, default_parameters
+
+    variant = args.variant or DEFAULT_VARIANT
+    parameters = with_overrides(default_parameters(variant), parse_assignments(args.param))
+    return create_tracker(variant, parameters), variant
+
+
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Refuse an output that would overwrite the source, before anything is opened."""
+    source = Path(args.source).resolve()
+    for name in ('output', 'video', 'bag'):
+        value = getattr(args, name)
+        if value and value != '-' and Path(value).resolve() == source:
+            raise RecordingError(f'--{name} {value} is the source itself: give another name')
+
+
+def _frame_range(args: argparse.Namespace, recording: Recording) -> tuple[int, int]:
+    count = len(recording)
+    if count == 0:
+        raise RecordingError(f'{recording.path} holds no frames: nothing to track')
+    end = count if args.end is None else min(args.end, count)
+    if not 0 <= args.start < count:
+        raise ParameterError(f'--start {args.start}: the recording has frames 0 to {count - 1}')
+    if end <= args.start:
+        raise ParameterError(f'--end {args.end}: it must be above --start {args.start}')
+    return args.start, end
+
+
+def _first_box(given: Box | None, recording: Recording, start: int, end: int) -> tuple[Box, int]:
+    """The box to start on, and the frame it is for."""
+    if given is not None:
+        return given, start
+    truth = recording.groundtruth
+    if truth is None:
+        raise BoxError(
+            f'{recording.path} has no ground truth: give the target as --init X,Y,W,H '
+            f'(pixels in frame {start})'
+        )
+    for number in range(start, min(end, len(truth))):
+        box = truth[number]
+        if box is not None:
+            return box, number
+    raise BoxError(
+        f'the ground truth has no box from frame {start} to {end - 1}: '
+        'give the target as --init X,Y,W,H, or another range'
+    )
