@@ -24,8 +24,10 @@ def main(args: list[str] | None = None) -> int:
 
     from rgbd_kcf_tracker.errors import RgbdKcfError
     from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+    from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
     stop = _stop_on_signals()
+    ensure_image_transport()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy has no common class for arguments that it cannot parse

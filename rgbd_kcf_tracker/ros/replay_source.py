@@ -15,7 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.recordings import track_messages
+from rgbd_kcf_tracker.recordings.bag_writer import GENERIC
 from rgbd_kcf_tracker.recordings.bags import BagRecording
+from rgbd_kcf_tracker.recordings.encoding import RawImage, encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
@@ -23,6 +27,9 @@ from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.ros.replay_message import Message, Role
 from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
 
+FOLDER_TOPICS = GENERIC
+"""Where the images of a sequence folder go: the tracker's own names, which need no remapping."""
+_IMAGE, _INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
 NEVER_REPLAYED = ('/clock', '/rosout', '/parameter_events')
 
 
@@ -230,16 +237,47 @@ class _BagMessages:
 class _FolderMessages:
     """Messages made of the frames of a sequence folder."""
 
+    warnings: list[str]
+
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self.color_topic: str | None = None
-        self.depth_topic: str | None = None
-        self.info_topic: str | None = None
-        self.warnings: list[str] = []
-        self.topics: list[SourceTopic] = []
         self._recording = SequenceFolder(path, options)
+        self.warnings = self._recording.warnings
+        info = self._recording.info()
+        self.color_topic: str | None = FOLDER_TOPICS.color
+        self.depth_topic = FOLDER_TOPICS.depth if info.frames_with_depth else None
+        self.info_topic = None if info.intrinsics is None else FOLDER_TOPICS.info
+        counts = (
+            (self.info_topic, _INFO, info.frames),
+            (self.color_topic, _IMAGE, info.frames),
+            (self.depth_topic, _IMAGE, info.frames_with_depth),
+        )
+        self.topics = [SourceTopic(name, kind, n) for name, kind, n in counts if name is not None]
 
     def read(self, names: frozenset[str], start_s: float) -> Iterator[Message]:
-        raise RecordingError('not yet')
+        first: int | None = None
+        for frame in self._recording.frames():
+            if first is None:
+                first = frame.stamp_ns
+            if (frame.stamp_ns - first) * 1e-9 < start_s:
+                continue
+            for topic, kind, role, message in self._of_frame(frame):
+                if topic in names:
+                    data = bytes(typestore(False).serialize_cdr(message, kind))
+                    yield Message(topic, frame.stamp_ns, data, role, frame.stamp_ns)
+
+    def _of_frame(self, frame: Frame) -> Iterator[tuple[str, str, Role, Any]]:
+        head = track_messages.header(frame.stamp_ns, FOLDER_TOPICS.frame_id)
+        if frame.intrinsics is not None:
+            info = track_messages.camera_info(head, frame.width, frame.height, frame.intrinsics)
+            yield FOLDER_TOPICS.info, _INFO, Role.OTHER, info
+        yield FOLDER_TOPICS.color, _IMAGE, Role.COLOR, _image(head, encode_color(frame.color))
+        if frame.depth is not None:
+            yield FOLDER_TOPICS.depth, _IMAGE, Role.DEPTH, _image(head, encode_depth(frame.depth))
 
     def close(self) -> None:
         self._recording.close()
+
+
+def _image(head: Any, raw: RawImage) -> Any:
+    fields = (raw.height, raw.width, raw.encoding, raw.is_bigendian, raw.step, raw.data)
+    return typestore(False).types[_IMAGE](head, *fields)

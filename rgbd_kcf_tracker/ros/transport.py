@@ -1,0 +1,63 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Fast DDS made fit for images, before ROS starts in this process.
+
+With the default shared-memory segment an image is cut into pieces, some are lost, and a reliable
+writer repeats them three seconds later. On one host only the publisher's segment matters.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from pathlib import Path
+
+from rgbd_kcf_tracker.ros.bench_rig import PROFILE_VARIABLE, profile_path
+
+SHM = Path('/dev/shm')
+_MEGABYTE = 1 << 20
+_LARGEST, _SMALLEST = 32 * _MEGABYTE, 4 * _MEGABYTE
+
+
+def segment_size(free: int) -> int:
+    """Bytes for this process's segment where ``free`` bytes of shared memory are left.
+
+    A quarter of it: others publish too, and a segment that does not fit fails without a word.
+    """
+    return max(_SMALLEST, min(_LARGEST, free // 4 // _MEGABYTE * _MEGABYTE))
+
+
+def ensure_image_transport() -> None:
+    """Use the package's Fast DDS profile, unless the user names one or another middleware.
+
+    The profile's segment is made smaller where shared memory is small, as in containers.
+    """
+    if os.environ.get(PROFILE_VARIABLE):
+        return
+    if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
+        return
+    profile = profile_path()
+    if profile is None:
+        return
+    try:
+        space = os.statvfs(SHM)
+        size = segment_size(space.f_bavail * space.f_frsize)
+    except OSError:
+        size = _SMALLEST
+    if size < _LARGEST:
+        profile = _resized(profile, size)
+    os.environ[PROFILE_VARIABLE] = str(profile)
+
+
+def _resized(profile: Path, size: int) -> Path:
+    """A copy of the profile with another segment size, kept for the processes that follow."""
+    text = profile.read_text(encoding='utf-8')
+    text = re.sub(r'(<segment_size>)\d+(</segment_size>)', rf'\g<1>{size}\g<2>', text)
+    folder = Path(tempfile.gettempdir())
+    copy = folder / f'rgbd_kcf_tracker_fastdds_{size // _MEGABYTE}mb_{os.getuid()}.xml'
+    part = copy.with_suffix(f'.{os.getpid()}')
+    part.write_text(text, encoding='utf-8')
+    os.replace(part, copy)
+    return copy
