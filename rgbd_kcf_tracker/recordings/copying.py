@@ -10,12 +10,14 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.bag_writer import GENERIC, BagWriter, CameraTopics
 from rgbd_kcf_tracker.recordings.bags import BagRecording
-from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter
+from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, definition_text
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import Recording
-from rgbd_kcf_tracker.recordings.storage import Definition, Topic
+from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
+from rgbd_kcf_tracker.recordings.storage import Definition
 from rgbd_kcf_tracker.recordings.topics import base_name
 
 T = TypeVar('T')
@@ -94,67 +96,44 @@ def copy_bag(
         RecordingError: where the bag cannot be read on, or the file not be written.
     """
     warnings: list[str] = []
-    translate = _Translator(bag, warnings)
+    translate = Ros1Translator(bag) if bag.ros1 else _Passer(bag)
     total = sum(len(t) for t in bag.topics.values())
     count = 0
+    refused: set[str] = set()
     with McapWriter(path, compression) as writer:
         for topic, index in progress(bag.in_order(), total):
-            definition = translate.definition(topic)
-            if definition is None:
+            if topic.type in refused:
                 continue
-            data = translate.data(topic, bag.read(topic, index), index)
-            if data is None:
+            found = translate.type_of(topic.type)
+            if found is None:
+                refused.add(topic.type)
+                warnings.append(
+                    f'{topic.name} is left out: the bag does not say what {topic.type} is'
+                )
                 continue
-            writer.write_raw(topic.name, topic.type, data, topic.log_ns[index], definition)
+            kind, definition = found
+            try:
+                data = translate.data(topic.type, bag.read(topic, index))
+            except RecordingError as error:
+                warnings.append(f'message {index} of {topic.name} is left out: {error}')
+                continue
+            writer.write_raw(topic.name, kind, data, topic.log_ns[index], definition)
             count += 1
     return count, warnings
 
 
-class _Translator:
-    """Finds the text of each type for ROS 2, and turns ROS 1 messages into CDR."""
+class _Passer:
+    """ROS 2 messages as they are, with the text of their type from the bag or from Jazzy."""
 
-    def __init__(self, bag: RawBag, warnings: list[str]) -> None:
-        self._bag = bag
-        self._warnings = warnings
-        self._definitions: dict[str, Definition | None] = {}
-        self._store = typestore(bag.ros1)
+    def __init__(self, bag: RawBag) -> None:
+        self._definitions = bag.definitions
 
-    def definition(self, topic: Topic) -> Definition | None:
-        """Text of the topic's type, or None (and a warning, once) where nothing is known of it."""
-        if topic.type not in self._definitions:
-            self._definitions[topic.type] = found = self._find(topic.type)
-            if found is None:
-                self._warnings.append(
-                    f'{topic.name} is left out: the bag does not say what {topic.type} is'
-                )
-        return self._definitions[topic.type]
+    def type_of(self, kind: str) -> tuple[str, Definition] | None:
+        if kind in self._definitions:
+            return kind, self._definitions[kind]
+        if kind in typestore().types:
+            return kind, Definition('ros2msg', definition_text(kind))
+        return None
 
-    def data(self, topic: Topic, data: bytes, index: int) -> bytes | memoryview | None:
-        """The message in CDR, or None (and a warning) where it is damaged."""
-        if not self._bag.ros1:
-            return data
-        try:
-            translated: bytes | memoryview = self._store.ros1_to_cdr(data, topic.type)
-            return translated
-        except Exception as error:  # a hostile message makes the library raise anything
-            self._warnings.append(f'message {index} of {topic.name} is left out: {error}')
-            return None
-
-    def _find(self, kind: str) -> Definition | None:
-        known = self._bag.definitions.get(kind)
-        if known is not None and known.encoding in ('ros2msg', 'ros2idl'):
-            return known
-        jazzy = typestore()
-        if kind in jazzy.types:
-            return Definition('ros2msg', str(jazzy.generate_msgdef(kind, ros_version=2)[0]))
-        if known is None:
-            return None
-        try:
-            from rosbags.typesys import get_types_from_msg
-
-            if kind not in self._store.types:
-                found = get_types_from_msg(known.text, kind)
-                self._store.register({k: v for k, v in found.items() if k not in self._store.types})
-            return Definition('ros2msg', str(self._store.generate_msgdef(kind, ros_version=2)[0]))
-        except Exception:  # whatever the library says of a text that is no definition
-            return None
+    def data(self, kind: str, data: bytes) -> bytes | memoryview:
+        return data
