@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.trackers import Track, TrackState, create_tracker
 
@@ -20,6 +22,25 @@ Choice = Callable[[Frame], 'Box | None']
 """Finds the target in a frame: None to look again in the next. May raise an RgbdKcfError."""
 
 IDLE = Track(None, TrackState.IDLE)
+
+
+_warm: set[str] = set()
+
+
+def warm_up(variant: str) -> None:
+    """Have a variant run once, so that its lazy imports and caches do not delay a live frame."""
+    if variant in _warm:
+        return
+    _warm.add(variant)
+    rng = np.random.default_rng(0)
+    color = rng.integers(0, 255, (120, 160, 3), np.uint8)
+    depth = np.full((120, 160), 3.0, np.float32)
+    depth[40:90, 60:90] = 2.0
+    tracker = create_tracker(variant)
+    camera = Intrinsics.guess(160, 120)
+    tracker.start(Frame(color, depth, 0, camera), Box(60, 40, 30, 50))
+    for step in range(1, 4):
+        tracker.update(Frame(color, depth, step * 33_333_333, camera))
 
 
 class Session:

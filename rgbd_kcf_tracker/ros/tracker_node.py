@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.ros.messages import box_from_roi
 from rgbd_kcf_tracker.ros.parameters import ParameterServer
 from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
 from rgbd_kcf_tracker.ros.publishers import TrackPublishers
-from rgbd_kcf_tracker.ros.session import Choice, Session
+from rgbd_kcf_tracker.ros.session import Choice, Session, warm_up
 from rgbd_kcf_tracker.ros.settings import ALL, RESTART, NodeParameters, parse_box
 from rgbd_kcf_tracker.ros.statistics import Statistics
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
@@ -94,6 +94,7 @@ class TrackerNode(LifecycleNode):
                 self._parameters_server.variant_parameters(settings.variant),
                 partial(self._fault, 'rejected_requests'),
             )
+            warm_up(settings.variant)
             self._outputs = TrackPublishers(self)
             self._processor = Processor(
                 self._session,

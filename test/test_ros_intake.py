@@ -1,0 +1,298 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the node is made of, piece by piece and without DDS: intake, timeline, worker, session."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState
+from rgbd_kcf_tracker.ros.intake import Intake
+from rgbd_kcf_tracker.ros.processor import Camera
+from rgbd_kcf_tracker.ros.session import Session
+from rgbd_kcf_tracker.ros.statistics import Statistics
+from rgbd_kcf_tracker.ros.timeline import Timeline
+from rgbd_kcf_tracker.ros.worker import Worker
+from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, default_parameters
+
+MS = 1_000_000
+BASE = 1_700_000_000 * 1000 * MS
+CAMERA = Camera(Intrinsics(500, 500, 160, 120), 0, 0)
+
+
+def message(stamp_ns: int, data: bytes = b'') -> SimpleNamespace:
+    stamp = SimpleNamespace(sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+    return SimpleNamespace(
+        header=SimpleNamespace(stamp=stamp, frame_id='camera'), data=data or str(stamp_ns).encode()
+    )
+
+
+def intake(patient: bool = False, camera: bool = True, **values) -> Intake:
+    settings = {'tolerance_s': 0.02, 'depth_wait_s': 0.1, 'camera_info_wait_s': 1.0}
+    made = Intake(Statistics(), patient=patient, **(settings | values))
+    if camera:
+        made.camera_info(CAMERA, 0)
+    return made
+
+
+def test_equal_stamps_pair_at_once() -> None:
+    made = intake()
+    color, depth = message(BASE), message(BASE)
+    assert made.color(color, 0) == []
+    (capture,) = made.depth(depth, 5 * MS)
+    assert capture.color is color
+    assert capture.depth is depth
+    assert capture.camera is CAMERA
+    assert made.idle
+
+
+def test_colour_waits_for_depth_only_so_long() -> None:
+    made = intake()
+    assert made.color(message(BASE), 0) == []
+    assert made.poll(99 * MS) == []
+    (capture,) = made.poll(100 * MS)
+    assert capture.depth is None
+
+
+def test_without_depth_nothing_waits_after_a_few_misses_until_depth_returns() -> None:
+    made = intake()
+    for index in range(3):
+        now = index * 200 * MS
+        assert made.color(message(BASE + now), now) == []
+        assert len(made.poll(now + 100 * MS)) == 1
+    late = 700 * MS
+    assert len(made.color(message(BASE + late), late)) == 1
+    made.depth(message(BASE + late), late + 5 * MS)
+    assert made.color(message(BASE + 800 * MS), 800 * MS) == []
+    assert len(made.depth(message(BASE + 800 * MS), 805 * MS)) == 1
+
+
+def test_nobody_publishes_depth_so_nothing_waits() -> None:
+    made = intake()
+    made.depth_expected = False
+    assert len(made.color(message(BASE), 0)) == 1
+
+
+def test_patient_waits_longer() -> None:
+    made = intake(patient=True)
+    made.color(message(BASE), 0)
+    assert made.poll(900 * MS) == []
+    assert len(made.poll(1000 * MS)) == 1
+
+
+def test_first_captures_wait_for_camera_info() -> None:
+    made = intake(camera=False)
+    made.color(message(BASE), 0)
+    assert made.depth(message(BASE), MS) == []
+    (capture,) = made.camera_info(CAMERA, 10 * MS)
+    assert capture.camera is CAMERA
+    made.color(message(BASE + 33 * MS), 33 * MS)
+    assert len(made.depth(message(BASE + 33 * MS), 34 * MS)) == 1
+
+
+def test_camera_info_that_never_comes_is_waited_for_once() -> None:
+    made = intake(camera=False, patient=True)
+    for index in range(3):
+        made.color(message(BASE + index * 33 * MS), index * 33 * MS)
+        assert made.depth(message(BASE + index * 33 * MS), index * 33 * MS) == []
+    captures = made.poll(1000 * MS)
+    assert [c.camera for c in captures] == [None] * 3
+    assert [c.arrival_ns for c in captures] == [1000 * MS] * 3
+    made.color(message(BASE + 1100 * MS), 1100 * MS)
+    assert len(made.depth(message(BASE + 1100 * MS), 1100 * MS)) == 1
+
+
+def test_no_camera_info_publisher_no_wait() -> None:
+    made = intake(camera=False)
+    made.info_expected = False
+    made.color(message(BASE), 0)
+    (capture,) = made.depth(message(BASE), MS)
+    assert capture.camera is None
+
+
+@pytest.mark.parametrize('stamp', [0, BASE])
+def test_stamps_that_never_change_still_pair(stamp: int) -> None:
+    made = intake()
+    captures = []
+    for index in range(10):
+        now = BASE + index * 33 * MS
+        captures += made.color(message(stamp, b'c%d' % index), now)
+        captures += made.depth(message(stamp, b'd%d' % index), now + 4 * MS)
+        captures += made.poll(now + 10 * MS)
+    captures += made.poll(BASE + 2000 * MS)
+    assert [c.color.data for c in captures] == [b'c%d' % i for i in range(10)]
+    assert [c.depth.data for c in captures if c.depth] == [b'd%d' % i for i in range(10)]
+
+
+def test_the_same_message_again_is_dropped_and_counted() -> None:
+    made = intake()
+    captures = []
+    for _ in range(2):
+        captures += made.color(message(BASE), 0)
+    for _ in range(2):
+        captures += made.depth(message(BASE), 0)
+    assert len(captures) == 1
+    counts = made._statistics.snapshot().counts
+    assert counts['duplicates'] + counts['repeated'] == 2
+
+
+def test_a_stamp_far_in_the_future_loses_no_other_image() -> None:
+    made = intake()
+    captures = []
+    for index in range(10):
+        stamp = BASE + index * 33 * MS + (10**9 * 86400 * 365 if index == 5 else 0)
+        captures += made.color(message(stamp), index * 33 * MS)
+        captures += made.depth(message(stamp), index * 33 * MS + MS)
+        captures += made.poll(index * 33 * MS + 2 * MS)
+    captures += made.poll(10**9)
+    assert len(captures) == 10
+    assert sum(c.depth is not None for c in captures) == 10
+
+
+def test_a_loop_goes_on_with_pairs() -> None:
+    made = intake()
+    captures = []
+    for index in range(60):
+        stamp = BASE + (index % 20) * 133 * MS
+        captures += made.color(message(stamp), index * 133 * MS)
+        captures += made.depth(message(stamp), index * 133 * MS + MS)
+    assert len(captures) == 60
+    assert all(c.depth is not None for c in captures)
+
+
+def test_depth_without_colour_is_bounded() -> None:
+    made = intake()
+    for index in range(500):
+        made.depth(message(BASE + index * 33 * MS), index * 33 * MS)
+    assert made._pairer.waiting[1] <= 30
+    assert made._statistics.snapshot().counts['depth_without_color'] >= 470
+
+
+def test_timeline_is_the_stamp_while_stamps_behave() -> None:
+    line = Timeline()
+    stamps = BASE + np.cumsum(np.random.default_rng(1).integers(1, 500, 50)) * MS
+    moments = [line.advance(int(s), i * 33 * MS) for i, s in enumerate(stamps)]
+    assert [m.time_ns for m in moments] == stamps.tolist()
+    assert not any(m.jumped for m in moments)
+
+
+@pytest.mark.parametrize(
+    ('steps_ms', 'jumps', 'restarts'),
+    [
+        ((33, 33, -5000, 33, 33), 1, 1),  # a loop
+        ((33, 86_400_000, -86_399_967, 33), 2, 0),  # one stamp a day ahead
+        ((33, 86_400_000, 33, 33), 1, 0),  # a clock that was set
+        ((0, 0, 0), 0, 0),
+        ((33, 0, 33), 0, 0),
+    ],
+)
+def test_timeline_rises_whatever_the_stamps_do(
+    steps_ms: tuple[int, ...], jumps: int, restarts: int
+) -> None:
+    line = Timeline()
+    stamp, moments = BASE, [line.advance(BASE, 0)]
+    for index, step in enumerate(steps_ms, 1):
+        stamp += step * MS
+        moments.append(line.advance(stamp, index * 33 * MS))
+    steps = np.diff([m.time_ns for m in moments])
+    assert (steps > 0).all()
+    assert (steps <= 60 * 10**9).all()
+    assert sum(m.jumped for m in moments) == jumps
+    assert sum(m.restarted for m in moments) == restarts
+
+
+def test_worker_takes_the_newest_and_counts_the_others() -> None:
+    done, gate = [], threading.Event()
+
+    def work(item: int) -> None:
+        gate.wait(5)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail)
+    worker.submit(0)
+    time.sleep(0.05)  # item 0 is in work
+    dropped = sum(worker.submit(item) for item in range(1, 6))
+    gate.set()
+    time.sleep(0.1)
+    assert worker.stop()
+    assert done == [0, 5]
+    assert dropped == 4
+
+
+def test_worker_takes_all_in_order_and_outlives_errors() -> None:
+    done, errors = [], []
+
+    def work(item: int) -> None:
+        if item % 3 == 0:
+            raise ValueError(item)
+        done.append(item)
+
+    worker = Worker(work, errors.append, keep=100)
+    for item in range(20):
+        assert worker.submit(item) == 0
+    worker.call(lambda: done.append('call'))
+    time.sleep(0.2)
+    assert worker.stop()
+    assert [d for d in done if d != 'call'] == [i for i in range(20) if i % 3]
+    assert 'call' in done
+    assert len(errors) == 7
+    assert worker.submit(1) == 0
+
+
+def test_worker_ends_while_at_work() -> None:
+    worker = Worker(lambda _: time.sleep(0.05), pytest.fail, keep=100)
+    for item in range(100):
+        worker.submit(item)
+    begun = time.monotonic()
+    assert worker.stop()
+    assert time.monotonic() - begun < 1
+
+
+def frame(index: int = 0) -> Frame:
+    rng = np.random.default_rng(2)
+    color = rng.integers(0, 255, (120, 160, 3), np.uint8)
+    depth = np.full((120, 160), 3.0, np.float32)
+    depth[40:80, 60:90] = 2.0
+    return Frame(color, depth, BASE + index * 33 * MS, CAMERA.intrinsics)
+
+
+def session() -> tuple[Session, list[str]]:
+    said: list[str] = []
+    return Session(DEFAULT_VARIANT, default_parameters(DEFAULT_VARIANT), said.append), said
+
+
+def test_session_choice_that_fails_keeps_the_target() -> None:
+    made, said = session()
+    assert made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    made.choose(lambda _: Box(500, 500, 10, 10))
+    assert made.process(frame(1)).state is TrackState.TRACKING
+    assert len(said) == 1
+    assert not made.choosing
+
+
+def test_session_takes_new_parameters_on_the_present_box() -> None:
+    made, _ = session()
+    made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    made.process(frame(1))
+    made.configure('kcf', default_parameters('kcf').replace(padding=2.0))
+    track = made.process(frame(2))
+    assert track.box is not None
+    assert made.variant == 'kcf'
+    assert made.process(frame(3)).box.iou(Box(60, 40, 30, 40)) > 0.7
+
+
+def test_session_reset_forgets_target_and_wishes() -> None:
+    made, _ = session()
+    made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    made.choose(lambda _: Box(1, 1, 30, 40))
+    made.reset()
+    assert not made.needs_frame
+    assert made.process(frame(1)).state is TrackState.IDLE
