@@ -45,7 +45,8 @@ class StampRepair:
             if _same(data, self._data):
                 return None
             repaired = self._repaired + max(arrival_ns - self._arrival, 1)
-        elif stamp_ns == 0:
+        elif stamp_ns == 0 and self._stamp is not None:
+            # The first may be 0 rightly: the stamps of a converted folder count from there.
             repaired = arrival_ns
         self._stamp, self._data = stamp_ns, data
         self._repaired, self._arrival = repaired, arrival_ns
