@@ -153,6 +153,10 @@ class StampPairer(Generic[C, D]):
             self.counts.overflow += 1
         return out
 
+    def release(self, stamp_ns: int) -> list[Pair[C, D]]:
+        """Give out every colour message up to this stamp with what there is for it by now."""
+        return [self._take(s, self._partner(s)) for s in sorted(self._colors) if s <= stamp_ns]
+
     def flush(self) -> list[Pair[C, D]]:
         """Give out all that waits, as at the end of both streams."""
         out = self._give_out_all()
