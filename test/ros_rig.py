@@ -138,6 +138,7 @@ class Rig:
             publisher = self.node.create_publisher(CompressedImage, topic, QoSProfile(depth=50))
             self.compressed[topic] = publisher
             self.wait(lambda: publisher.get_subscription_count() > 0)
+            time.sleep(0.2)  # discovery is one-sided
         self.compressed[topic].publish(message)
 
     def play(self, indices: Any, **header: Any) -> None:
@@ -201,12 +202,17 @@ def overrides(values: dict[str, Any]) -> list[Parameter]:
 
 
 @contextmanager
-def running_node(rig: Rig, **values: Any) -> Iterator[TrackerNode]:
-    """The node in this process, in an executor and context of its own."""
+def running_node(
+    rig: Rig, namespace: str = '', wait: bool = True, **values: Any
+) -> Iterator[TrackerNode]:
+    """The node in this process, in an executor and context of its own.
+
+    Parameters of a variant are given with two underscores: ``kcf__padding=2.0``.
+    """
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
     names = {name.replace('__', '.'): value for name, value in values.items()}
-    node = TrackerNode(context=context, parameter_overrides=overrides(names))
+    node = TrackerNode(context=context, namespace=namespace, parameter_overrides=overrides(names))
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     stop = threading.Event()
@@ -215,7 +221,7 @@ def running_node(rig: Rig, **values: Any) -> Iterator[TrackerNode]:
         node.autostart()
     thread.start()
     try:
-        if node.settings.autostart:
+        if node.settings.autostart and wait:
             rig.await_listener()
         yield node
     finally:
