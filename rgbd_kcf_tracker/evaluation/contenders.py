@@ -154,32 +154,26 @@ def boxes(text: str) -> Contender:
     return Contender(name, 'boxes', pattern)
 
 
-def ablations(base: Contender) -> list[Contender]:
-    """The variant with each of its switches off in turn.
-
-    Raises:
-        ParameterError: where it is no variant, or has no parameter ``use_...``.
-    """
-    if base.kind != 'variant':
-        raise ParameterError(f'{base.name} cannot be ablated: it has no parameters of ours')
-    given = dict(base.overrides)
+def switches(base: Contender) -> list[str]:
+    """The parameters ``use_...`` of a variant that are on: its ingredients."""
     current = base.parameters()
-    switches = [
+    return [
         info.name
         for info in describe(VARIANTS[base.target].parameters)
         if info.type is bool and info.name.startswith(SWITCH_PREFIX) and getattr(current, info.name)
     ]
-    if not switches:
-        raise ParameterError(
-            f'{base.name} cannot be ablated: it has no parameter that begins with {SWITCH_PREFIX}'
-        )
+
+
+def ablations(base: Contender) -> list[Contender]:
+    """The variant with each of its switches off in turn."""
+    given = dict(base.overrides)
     return [
         dataclasses.replace(
             base,
             name=f'{base.name} without {name.removeprefix(SWITCH_PREFIX)}',
             overrides=tuple(sorted({**given, name: 'false'}.items())),
         )
-        for name in switches
+        for name in switches(base)
     ]
 
 

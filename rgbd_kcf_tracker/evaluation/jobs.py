@@ -107,6 +107,18 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
 
 
+def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
+    """Whether the same run has been made: same frames, parameters, code and options."""
+    tracks = tracks_path(folder, contender.name, sequence.name)
+    if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
+        return False
+    try:
+        meta = json.loads(meta_path(tracks).read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        return False
+    return bool(meta.get('key') == run_key(sequence, contender, options))
+
+
 @cache
 def code_digest() -> str:
     """Version and digest of the code that makes frames and tracks."""
@@ -139,8 +151,9 @@ def _run_sequence(job: Job) -> list[Failure]:
             passes[contender.name] = OnePass(contender.make())
             if options.short_term and opened.annotated:
                 restarts[contender.name] = WithRestarts(contender.make())
-    thumbnails, samples = Thumbnails(), []
+    thumbnails, samples, size = Thumbnails(), [], (0, 0)
     for sample in _samples(opened, sequence, options):
+        size = sample.frame.width, sample.frame.height
         samples.append((sample.frame.stamp_ns, sample.visible, sample.body, sample.fraction))
         thumbnails.feed(sample.frame)
         for one in (*passes.values(), *restarts.values()):
@@ -166,7 +179,11 @@ def _run_sequence(job: Job) -> list[Failure]:
             continue
         target = tracks_path(job.folder, contender.name, sequence.name)
         write_tracks(target, stamps, one.tracks)
-        write_json(meta_path(target), _meta(job, contender, one, restart, opened, thumbnails.scale))
+        write_json(
+            meta_path(target),
+            _meta(job, contender, one, restart, opened)
+            | {'image_size': size, 'thumbnail_scale': thumbnails.scale},
+        )
     return failures
 
 
@@ -184,7 +201,6 @@ def _meta(
     one: OnePass,
     restart: WithRestarts | None,
     opened: Opened,
-    scale: float,
 ) -> dict[str, Any]:
     sequence = job.sequence
     meta: dict[str, Any] = {
@@ -198,7 +214,6 @@ def _meta(
         'categories': dict(sequence.categories),
         'version': rgbd_kcf_tracker.__version__,
         'warnings': list(opened.warnings),
-        'thumbnail_scale': scale,
         'milliseconds': [round(ms, 3) for ms in one.milliseconds],
     }
     if restart is not None:

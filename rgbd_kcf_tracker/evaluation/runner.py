@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import cv2
@@ -16,11 +15,8 @@ from rgbd_kcf_tracker.evaluation.jobs import (
     Failure,
     Job,
     RunOptions,
-    meta_path,
+    is_done,
     run_job,
-    run_key,
-    tracks_path,
-    truth_path,
 )
 from rgbd_kcf_tracker.evaluation.pool import Report, run_parallel
 
@@ -69,15 +65,3 @@ def run(
     else:
         failures.extend(run_parallel(jobs, options.jobs, report))
     return failures
-
-
-def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
-    """Whether the same run has been made: same frames, parameters, code and options."""
-    tracks = tracks_path(folder, contender.name, sequence.name)
-    if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
-        return False
-    try:
-        meta = json.loads(meta_path(tracks).read_text(encoding='utf-8'))
-    except (OSError, ValueError):
-        return False
-    return bool(meta.get('key') == run_key(sequence, contender, options))

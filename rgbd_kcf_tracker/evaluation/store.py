@@ -79,9 +79,24 @@ def write_atomically(path: Path, data: str | bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def write_json(path: Path, value: Any) -> None:
-    """JSON, readable, NaN as null."""
-    write_atomically(path, json.dumps(_plain(value), indent=1, allow_nan=False) + '\n')
+def write_json(path: Path, value: Any, indent: int | None = None) -> None:
+    """JSON with NaN as null."""
+    write_atomically(path, json.dumps(_plain(value), indent=indent, allow_nan=False) + '\n')
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """A JSON object.
+
+    Raises:
+        DatasetError: where it cannot be read.
+    """
+    try:
+        value = json.loads(path.read_text(encoding='utf-8'))
+    except (OSError, ValueError) as error:
+        raise DatasetError(f'{path} cannot be read: {error}') from None
+    if not isinstance(value, dict):
+        raise DatasetError(f'{path} holds no JSON object')
+    return value
 
 
 def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:

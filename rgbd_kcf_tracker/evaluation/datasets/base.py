@@ -11,6 +11,7 @@ true of it.
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -143,3 +144,13 @@ def folders(path: Path) -> list[Path]:
         return sorted(p for p in path.iterdir() if p.is_dir() and not p.name.startswith('.'))
     except OSError as error:
         raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+
+
+def group(path: Path) -> str:
+    """The scenario that a recording's name or place tells.
+
+    ``occlusion_3`` belongs to ``occlusion``, as ``rgbd-kcf simulate`` names its scenes; any other
+    recording to the folder that it lies in.
+    """
+    numbered = re.fullmatch(r'(.+?)[_-]\d+', path.stem)
+    return numbered[1] if numbered else path.resolve().parent.name

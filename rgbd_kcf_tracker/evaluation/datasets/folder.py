@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token, group
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
     check_lengths,
@@ -48,7 +48,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
         result.append(
             Sequence(
                 name=f'{path.name}/{person}' if person else path.name,
-                scenario=_scenario(path, bool(person)),
+                scenario=path.name if person else group(path),
                 kind='folder',
                 open=partial(load, path, truth, visible, bool(person), fps),
                 identity=f'folder:{file_token(*files)}:{fps}',
@@ -113,10 +113,6 @@ def read_fractions(path: Path) -> list[float]:
                 f'{path}, line {number}: {line.strip()[:60]!r}: write the visible share, 0 to 1'
             ) from None
     return result
-
-
-def _scenario(path: Path, person: bool) -> str:
-    return path.name if person else path.resolve().parent.name
 
 
 def _frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames:

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, file_token, group
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 
@@ -26,7 +26,7 @@ def find(path: Path, options: ReadOptions) -> Sequence:
     """One bag."""
     return Sequence(
         name=path.stem,
-        scenario=path.resolve().parent.name,
+        scenario=group(path),
         kind='recording',
         open=partial(load, path, options),
         identity=f'recording:{file_token(path)}:{options}',

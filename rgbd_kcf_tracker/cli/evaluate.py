@@ -1,0 +1,307 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``rgbd-kcf evaluate``: run trackers on benchmarks and write a report."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rgbd_kcf_tracker.cli.common import parse_assignments
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.evaluation.contenders import Contender
+    from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
+    from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
+    from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
+
+NAME = 'evaluate'
+HELP = 'run trackers on benchmarks or simulated scenes and write a report'
+
+EXIT_FAILURES = 1
+"""Exit code where the report was written but some runs failed."""
+
+_EPILOG = """\
+data sets:
+  DIR                 a sequence folder, or a folder of them: our own layout, OTB, VOT, CDTB,
+                      DepthTrack or Princeton, found out by their file names; or a bag with truth
+  sim:all             every simulated scene; sim:occlusion,crowd some; sim:all:1-5 with these seeds
+
+trackers:
+  --variants          kcf, rgbd, rgbd_pf, metric, and OpenCV's opencv:kcf, opencv:csrt, opencv:mil
+  --boxes NAME=PATH   boxes in files: a folder, or a path with {sequence} in it
+
+examples:
+  rgbd-kcf evaluate sim:all --seeds 1-3 --report report/
+  rgbd-kcf evaluate data/otb --kind otb --variants kcf,opencv:mil --report report/
+  rgbd-kcf evaluate data/otb --kind otb --boxes 'KCF=data/otb/{sequence}/results/KCF.txt' \\
+      --report report/
+  rgbd-kcf evaluate sim:all --variants metric --ablate --report report/
+
+Run again with the same --report to go on after an interruption, or to add trackers.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = _EPILOG
+    parser.add_argument('dataset', nargs='+', metavar='DATASET', help='see below')
+    parser.add_argument(
+        '--report', required=True, type=Path, metavar='DIR', help='where the report goes'
+    )
+    group = parser.add_argument_group('trackers')
+    group.add_argument('--variants', metavar='A,B', help='trackers to run (default: all of ours)')
+    group.add_argument(
+        '--boxes', action='append', default=[], metavar='NAME=PATH',
+        help="another tracker's boxes; may be given again",
+    )  # fmt: skip
+    group.add_argument(
+        '--param', action='append', default=[], metavar='[VARIANT.]KEY=VALUE',
+        help='a parameter other than its default; may be given again',
+    )  # fmt: skip
+    group.add_argument(
+        '--ablate', action='store_true',
+        help='also run each variant with every parameter use_... off in turn',
+    )  # fmt: skip
+    group = parser.add_argument_group('data')
+    group.add_argument(
+        '--kind', default='auto', metavar='KIND',
+        help='format, where it cannot be told by the names: folder, otb, vot, cdtb, depthtrack, '
+        'princeton, recording',
+    )  # fmt: skip
+    group.add_argument(
+        '--sequences', metavar='A,B', help='only sequences whose name holds one of these'
+    )
+    group.add_argument(
+        '--fps', type=float, default=30.0, metavar='F',
+        help='rate of folders that do not state theirs (default 30)',
+    )  # fmt: skip
+    group.add_argument(
+        '--rate', type=float, metavar='HZ',
+        help='render scenes at this rate, and thin recordings out to it (5, 15, 30)',
+    )  # fmt: skip
+    group.add_argument('--no-depth', action='store_true', help='give the trackers colour alone')
+    group.add_argument(
+        '--seeds', default='1', metavar='N', help='seeds of simulated scenes: 3, 1-5 (default 1)'
+    )
+    group.add_argument('--scenarios', metavar='A,B', help='only these simulated scenarios')
+    group.add_argument(
+        '--duration',
+        type=float,
+        metavar='S',
+        help='of simulated scenes (default: their own)',
+    )
+    group.add_argument(
+        '--size', default='960x540', metavar='WxH', help='of simulated images (default 960x540)'
+    )
+    group = parser.add_argument_group('running')
+    group.add_argument(
+        '--jobs', type=int, metavar='N', help='parallel processes (default: one per core)'
+    )
+    group.add_argument(
+        '--short-term', action='store_true',
+        help="also run VOT's protocol with re-initialisation (takes twice as long)",
+    )  # fmt: skip
+    group.add_argument(
+        '--fresh', action='store_true', help='run again what the report folder already holds'
+    )
+    group.add_argument(
+        '--export', action='append', default=[], choices=('princeton', 'vot'),
+        help='also write results as this benchmark takes them',
+    )  # fmt: skip
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run everything that is not done yet, then write the report; returns the exit code."""
+    from rgbd_kcf_tracker.evaluation.datasets import open_dataset
+    from rgbd_kcf_tracker.evaluation.export import export
+    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+    from rgbd_kcf_tracker.evaluation.perframe import collect
+    from rgbd_kcf_tracker.evaluation.report import PAGE, Heading, write_report
+    from rgbd_kcf_tracker.evaluation.tables import overview
+
+    contenders, ablated = _contenders(args)
+    sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
+    jobs = _default_jobs() if args.jobs is None else args.jobs
+    if jobs < 1:
+        raise ParameterError(f'--jobs is {jobs}: give 1 or more')
+    options = RunOptions(args.rate, not args.no_depth, args.short_term, jobs, args.fresh)
+    _check_writable(args.report)
+
+    failures = _run(sequences, contenders, args.report, options)
+    collected = collect(args.report, sequences, contenders, options)
+    for form in args.export:
+        export(args.report, sequences, contenders, options, form)
+    words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
+    heading = Heading(', '.join(args.dataset), _in_words(args), words, tuple(ablated))
+    if not collected.results and collected.unmeasured:
+        print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
+    else:
+        measured = write_report(args.report, collected, contenders, failures, heading)
+        print(overview(measured).text())
+        print(f'\nreport: {args.report / PAGE}')
+    _list_failures(failures)
+    return EXIT_FAILURES if failures else 0
+
+
+def _run(
+    sequences: list[Benchmark], contenders: list[Contender], folder: Path, options: RunOptions
+) -> list[Failure]:
+    from tqdm import tqdm
+
+    from rgbd_kcf_tracker.evaluation.runner import run as run_all
+
+    total = len(sequences) * len(contenders)
+    with tqdm(total=total, unit='run', disable=None, leave=False, smoothing=0.05) as bar:
+
+        def report(done: int, name: str) -> None:
+            bar.set_postfix_str(name, refresh=False)
+            bar.update(done)
+
+        try:
+            return run_all(sequences, contenders, folder, options, report)
+        except KeyboardInterrupt:
+            bar.close()
+            print('stopped; the same command goes on from here', file=sys.stderr)
+            raise
+
+
+def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
+    from rgbd_kcf_tracker.evaluation import contenders
+    from rgbd_kcf_tracker.trackers import VARIANTS
+
+    if args.variants is not None:
+        names = _words(args.variants)
+    else:
+        names = [] if args.boxes and not args.ablate else list(VARIANTS)
+    overrides = _overrides(args.param, names)
+    found, ablated = [], []
+    for name in names:
+        base = contenders.variant(name, overrides.get(name))
+        found.append(base)
+        if args.ablate and (base.kind == 'variant' and contenders.switches(base)):
+            found.extend(contenders.ablations(base))
+            ablated.append(base.name)
+    if args.ablate and not ablated:
+        raise ParameterError(
+            f'--ablate: none of {", ".join(names) or "no variants"} has a parameter use_... to '
+            'switch off'
+        )
+    found.extend(contenders.boxes(text) for text in args.boxes)
+    if not found:
+        raise ParameterError('no trackers: give --variants or --boxes')
+    return contenders.unique(found), ablated
+
+
+def _overrides(items: Sequence[str], variants: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Parameters per variant; a key without a variant is for all that have it."""
+    from rgbd_kcf_tracker.parameters import describe
+    from rgbd_kcf_tracker.trackers import VARIANTS
+
+    known = {
+        name: {info.name for info in describe(VARIANTS[name].parameters)}
+        for name in variants
+        if name in VARIANTS
+    }
+    result: dict[str, dict[str, str]] = {name: {} for name in known}
+    for key, value in parse_assignments(items).items():
+        variant, dot, name = key.rpartition('.')
+        owners = [variant] if dot else [v for v, names in known.items() if key in names]
+        if dot and variant not in known:
+            raise ParameterError(f'--param {key}: {variant!r} is not among the variants run')
+        if not owners:
+            raise ParameterError(f'--param {key}: none of {", ".join(known)} has this parameter')
+        for owner in owners:
+            result[owner][name] = value
+    return result
+
+
+def _data(args: argparse.Namespace) -> DatasetOptions:
+    from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
+
+    if args.rate is not None and not 0.1 <= args.rate <= 1000:
+        raise ParameterError(f'--rate is {args.rate:g} Hz: give 0.1 to 1000')
+    return DatasetOptions(
+        kind=args.kind,
+        fps=args.fps,
+        seeds=tuple(parse_seeds(args.seeds)),
+        scenarios=tuple(_words(args.scenarios or '')),
+        rate_hz=args.rate,
+        duration_s=args.duration,
+        size=_size(args.size),
+        names=tuple(_words(args.sequences or '')),
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, by, height = text.lower().partition('x')
+    if not by or not width.isdigit() or not height.isdigit():
+        raise ParameterError(f'--size {text!r}: give WIDTHxHEIGHT, such as 960x540')
+    return int(width), int(height)
+
+
+def _distinct(sequences: list[Benchmark]) -> list[Benchmark]:
+    """Refuse two sequences of one name: their results would lie in one file."""
+    from rgbd_kcf_tracker.evaluation.store import slug
+
+    seen: dict[str, Benchmark] = {}
+    for sequence in sequences:
+        other = seen.setdefault(slug(sequence.name), sequence)
+        if other is not sequence:
+            raise ParameterError(
+                f'two sequences are named {sequence.name} ({other.path} and {sequence.path}): '
+                'measure them in two runs, or rename one'
+            )
+    return sequences
+
+
+def _in_words(args: argparse.Namespace) -> str:
+    parts = []
+    if args.rate is not None:
+        parts.append(f'{args.rate:g} Hz')
+    if args.no_depth:
+        parts.append('without depth')
+    if any(text.startswith('sim:') for text in args.dataset):
+        parts.append(f'seeds {args.seeds} where none are given, {args.size}')
+    parts.extend(args.param)
+    return ', '.join(parts) or 'none'
+
+
+def _list_failures(failures: Sequence[Failure]) -> None:
+    if not failures:
+        return
+    print(f'\n{len(failures)} failed:', file=sys.stderr)
+    for failure in failures:
+        last = failure.reason.strip().splitlines()[-1]
+        tracker = f' ({failure.tracker})' if failure.tracker else ''
+        print(f'  {failure.sequence}{tracker}: {last}', file=sys.stderr)
+
+
+def _check_writable(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / '.write'
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordingError(f'{folder} cannot be written: {error.strerror or error}') from None
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(',') if word.strip()]
+
+
+def _default_jobs() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on this system
+        return os.cpu_count() or 1

@@ -1,0 +1,217 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The per-frame file: one row per tracker, sequence and frame, from which every number is taken.
+
+Tables, curves and Princeton's splits are all computed from the rows of this one file, so they agree
+with each other, and anybody can compute them again.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation.categories import derive
+from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
+from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path, truth_path
+from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, measure
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
+from rgbd_kcf_tracker.evaluation.store import (
+    read_json,
+    read_tracks,
+    read_truth,
+    write_atomically,
+)
+
+HEADER = (
+    'tracker', 'sequence', 'frame', 'stamp_ns', 'there', 'said', 'iou', 'dx_px', 'dy_px', 'ratio',
+    'score', 'visible_fraction', 'ms',
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Result:
+    """One tracker on one sequence, every frame from the given box on.
+
+    Attributes:
+        tracker: its name.
+        sequence: its name.
+        stamps_ns: one per frame.
+        frames: the comparison with the truth, the first frame included.
+        fraction: ``(N,)`` visible share, NaN where unknown.
+        milliseconds: ``(N,)`` time of each call, NaN where unknown (boxes from files).
+    """
+
+    tracker: str
+    sequence: str
+    stamps_ns: tuple[int, ...]
+    frames: Comparison
+    fraction: Array
+    milliseconds: Array
+
+    @property
+    def counted(self) -> Comparison:
+        """The frames that count: all but the first."""
+        f = self.frames
+        return Comparison(f.said[1:], f.there[1:], f.overlap[1:], f.offset[1:], f.score[1:])
+
+    def measures(self) -> Measures:
+        """All measures of the frames that count."""
+        return measure(self.counted)
+
+
+@dataclass(frozen=True, slots=True)
+class Info:
+    """What is known of a sequence beside its frames.
+
+    Attributes:
+        name: as in :class:`Result`.
+        scenario: its group.
+        kind: its format.
+        categories: Princeton's splits.
+        derived: whether the categories are by our criteria.
+        image_size: width and height.
+        thumbnail_scale: of the pictures kept.
+    """
+
+    name: str
+    scenario: str
+    kind: str
+    categories: Mapping[str, str] = field(default_factory=dict)
+    derived: bool = True
+    image_size: tuple[int, int] = (0, 0)
+    thumbnail_scale: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Collected:
+    """Everything a report is made of.
+
+    Attributes:
+        results: per tracker and sequence.
+        infos: per sequence.
+        short_term: runs with re-initialisation, per tracker and sequence.
+        unmeasured: sequences that were run but have no ground truth.
+    """
+
+    results: list[Result]
+    infos: dict[str, Info]
+    short_term: dict[tuple[str, str], ShortTermRun]
+    unmeasured: list[str]
+
+
+def collect(
+    folder: Path, sequences: Iterable[Sequence], contenders: list[Contender], options: RunOptions
+) -> Collected:
+    """Read what a run left in ``folder``; what failed, or was run otherwise, is not there."""
+    collected = Collected([], {}, {}, [])
+    for sequence in sequences:
+        for contender in contenders:
+            path = tracks_path(folder, contender.name, sequence.name)
+            if not is_done(folder, sequence, contender, options):
+                continue
+            _collect_one(collected, folder, sequence, contender, path)
+    return collected
+
+
+def _collect_one(
+    collected: Collected, folder: Path, sequence: Sequence, contender: Contender, path: Path
+) -> None:
+    meta = read_json(meta_path(path))
+    if not meta['annotated']:
+        if sequence.name not in collected.unmeasured:
+            collected.unmeasured.append(sequence.name)
+        return
+    truth, tracks = read_truth(truth_path(folder, sequence.name)), read_tracks(path)
+    size = int(meta['image_size'][0]), int(meta['image_size'][1])
+    own = dict(sequence.categories)
+    collected.infos[sequence.name] = Info(
+        sequence.name,
+        sequence.scenario,
+        sequence.kind,
+        own or derive(truth, size, sequence.scenario),
+        not own,
+        size,
+        float(meta['thumbnail_scale']),
+    )
+    count = len(truth.stamps_ns)
+    ms = np.full(count, np.nan)
+    times = meta['milliseconds'][:count]
+    ms[: len(times)] = times
+    frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
+    collected.results.append(
+        Result(contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, ms)
+    )
+    if 'short_term' in meta:
+        run = meta['short_term']
+        overlaps = np.array(run['run_overlaps'], np.float64)
+        codes = np.array(run['run_codes'], np.int64)
+        collected.short_term[contender.name, sequence.name] = ShortTermRun(codes, overlaps)
+
+
+def write_per_frame(path: Path, results: Iterable[Result]) -> None:
+    """Write the file; numbers to six digits, empty cells where there is none."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerow(HEADER)
+    for r in results:
+        f = r.frames
+        ratio = f.ratio
+        for i, stamp in enumerate(r.stamps_ns):
+            numbers = (f.overlap[i], *f.offset[i], ratio[i], f.score[i], r.fraction[i])
+            writer.writerow(
+                (
+                    r.tracker, r.sequence, i, stamp, int(f.there[i]), int(f.said[i]),
+                    *('' if math.isnan(v) else f'{v:.6g}' for v in numbers),
+                    '' if math.isnan(r.milliseconds[i]) else f'{r.milliseconds[i]:.2f}',
+                )
+            )  # fmt: skip
+    write_atomically(path, text.getvalue())
+
+
+def read_per_frame(path: Path) -> list[Result]:
+    """Read the file back.
+
+    Raises:
+        DatasetError: naming the line that is none.
+    """
+    rows: dict[tuple[str, str], list[list[str]]] = {}
+    try:
+        with path.open(encoding='utf-8', newline='') as file:
+            reader = csv.reader(file)
+            if tuple(next(reader, ())) != HEADER:
+                raise DatasetError(f'{path}, line 1: the header must be {",".join(HEADER)}')
+            for number, row in enumerate(reader, start=2):
+                if len(row) != len(HEADER):
+                    raise DatasetError(
+                        f'{path}, line {number}: {len(row)} cells, not {len(HEADER)}'
+                    )
+                rows.setdefault((row[0], row[1]), []).append(row)
+    except OSError as error:
+        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+    results = []
+    for (tracker, sequence), own in rows.items():
+        try:
+            stamps = tuple(int(row[3]) for row in own)
+            table = np.array([[float(v) if v else np.nan for v in row[4:]] for row in own])
+        except ValueError as error:
+            raise DatasetError(f'{path}, {tracker} on {sequence}: {error}') from None
+        frames = Comparison(
+            said=table[:, 1] == 1,
+            there=table[:, 0] == 1,
+            overlap=table[:, 2],
+            offset=table[:, 3:5],
+            score=table[:, 6],
+        )
+        results.append(Result(tracker, sequence, stamps, frames, table[:, 7], table[:, 8]))
+    return results

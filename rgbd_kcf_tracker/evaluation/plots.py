@@ -1,0 +1,240 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Plots of a report, each as the bytes of a PNG file."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from rgbd_kcf_tracker.evaluation.measured import Measured
+from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability
+from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
+from rgbd_kcf_tracker.evaluation.perframe import Result
+
+# Okabe and Ito's colours, which people with any colour vision can tell apart.
+PALETTE = (
+    '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00',
+    '#56B4E9', '#7F3C8D', '#444444', '#A5AA99',
+)  # fmt: skip
+ERROR_CAP_PX = 150.0
+"""Centre errors are drawn up to here, as in the thesis's Figure 3.3."""
+
+_DPI = 110
+_ABSENT, _PARTLY = '#c9ccd1', '#eceef1'
+
+
+def colors(trackers: Sequence[str]) -> dict[str, str]:
+    """One colour per tracker, the same in every plot."""
+    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(trackers)}
+
+
+def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
+    """Per tracker the mean curves over sequences: OTB success and precision, Princeton's R."""
+    curves: dict[str, dict[str, Array]] = {}
+    for tracker in measured.trackers:
+        own = [r.counted for r in measured.results if r.tracker == tracker]
+        shown = [c for c in own if c.there.any()]
+        curves[tracker] = {
+            'success': _mean([otb.success_curve(c.overlap[c.there]) for c in shown], 21),
+            'precision': _mean([otb.precision_curve(c.error[c.there]) for c in shown], 51),
+            'princeton': _mean([princeton.success_curve(c.ratio) for c in own if len(c)], 21),
+        }
+    return curves
+
+
+def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -> bytes:
+    """Success over IoU, precision over pixels, and Princeton's R over its thresholds."""
+    figure = _figure(12.5, 4.2)
+    panels = (
+        ('success', otb.OVERLAP_THRESHOLDS, 'IoU threshold', 'OTB success plot'),
+        ('precision', otb.PIXEL_THRESHOLDS, 'centre error threshold (px)', 'OTB precision plot'),
+        ('princeton', princeton.THRESHOLDS, 'overlap threshold', "Princeton's R"),
+    )
+    palette = colors(measured.trackers)
+    for index, (key, xs, label, title) in enumerate(panels):
+        axes = figure.add_subplot(1, 3, index + 1)
+        for tracker in measured.trackers:
+            ys = curves[tracker][key]
+            value = ys[otb.PRECISION_BIN] if key == 'precision' else np.mean(ys)
+            axes.plot(xs, ys, color=palette[tracker], lw=1.8, label=f'{tracker} [{value:.3f}]')
+        axes.set(xlabel=label, title=title, ylim=(0, 1.02), xlim=(xs[0], xs[-1]))
+        if index == 0:
+            axes.set_ylabel('share of frames')
+        _tidy(axes)
+        legend_title = 'at 20 px' if key == 'precision' else 'area under curve'
+        axes.legend(fontsize=7.5, title=legend_title, title_fontsize=7.5, frameon=False)
+    return _png(figure)
+
+
+def scenario_plot(measured: Measured, main: str) -> bytes:
+    """Success by scenario: one row per scenario, one dot per tracker, sorted by the main one."""
+    palette = colors(measured.trackers)
+    figure = _figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
+    axes = figure.add_subplot()
+    means = {
+        (t, s): 100 * measured.mean(t, s).success
+        for t in measured.trackers
+        for s in measured.scenarios
+    }
+    order = sorted(measured.scenarios, key=lambda s: means[main, s])
+    for y, scenario in enumerate(order):
+        values = [means[t, scenario] for t in measured.trackers]
+        axes.plot([min(values), max(values)], [y, y], color='#d5d8dc', lw=3, zorder=1)
+        for tracker, value in zip(measured.trackers, values, strict=True):
+            label = tracker if y == 0 else None
+            axes.scatter(value, y, s=34, color=palette[tracker], zorder=2, label=label)
+    axes.set_yticks(range(len(order)), order)
+    axes.set(xlim=(-1, 101), xlabel='success % (Princeton, 0.5)', ylim=(-0.7, len(order) - 0.3))
+    _tidy(axes)
+    axes.legend(
+        fontsize=8, frameon=False, loc='lower center', bbox_to_anchor=(0.5, 1.0),
+        ncols=min(5, len(measured.trackers)),
+    )  # fmt: skip
+    return _png(figure)
+
+
+def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
+    """Precision over recall while the score's threshold falls."""
+    figure = _figure(5.2, 4.2)
+    axes = figure.add_subplot()
+    palette = colors(list(curves))
+    for tracker, c in curves.items():
+        label = f'{tracker} [F {c.f_score:.3f}]'
+        axes.plot(c.recalls, c.precisions, color=palette[tracker], lw=1.8, label=label)
+        axes.plot(c.recall, c.precision, 'o', color=palette[tracker], ms=6)
+    axes.set(
+        xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.02),
+        title='Long-term precision and recall',
+    )  # fmt: skip
+    _tidy(axes)
+    axes.legend(fontsize=8, frameon=False)
+    return _png(figure)
+
+
+def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
+    """Share of right boxes over published score, and how many boxes have that score."""
+    count = len(tables)
+    columns = min(4, count)
+    rows = -(-count // columns)
+    figure = _figure(3.1 * columns + 0.4, 3.2 * rows)
+    palette = colors(list(tables))
+    for index, (tracker, table) in enumerate(tables.items()):
+        axes = figure.add_subplot(rows, columns, index + 1)
+        centers = (table.edges[:-1] + table.edges[1:]) / 2
+        share = table.counts / max(1, table.counts.sum())
+        axes.bar(centers, share, width=0.096, color=_ABSENT, label='share of boxes')
+        axes.plot([0, 1], [0, 1], '--', color='#888888', lw=1)
+        known = table.counts > 0
+        axes.plot(
+            table.mean_score[known], table.hit_rate[known], 'o-', color=palette[tracker], ms=4,
+            label='right boxes',
+        )  # fmt: skip
+        axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel='score')
+        axes.set_title(f'{tracker}\nerror {table.expected_error:.3f}', fontsize=9)
+        _tidy(axes)
+        if index == 0:
+            axes.legend(fontsize=7, frameon=False, loc='upper left')
+    return _png(figure)
+
+
+def expected_overlap_plot(runs: Mapping[tuple[str, str], vot.ShortTermRun]) -> bytes:
+    """VOT's expected average overlap over sequence length, the averaged lengths shaded."""
+    figure = _figure(5.2, 3.6)
+    axes = figure.add_subplot()
+    trackers = list(dict.fromkeys(t for t, _ in runs))
+    palette = colors(trackers)
+    for tracker in trackers:
+        own = [run for (t, _), run in runs.items() if t == tracker]
+        longest = max(len(r.codes) for r in own)
+        curve = vot.expected_overlap_curve(own, longest)
+        axes.plot(np.arange(1, longest + 1), curve, color=palette[tracker], lw=1.8, label=tracker)
+        low, high = vot.typical_lengths([len(r.codes) for r in own])
+        if tracker == trackers[0]:
+            axes.axvspan(low, max(high, low + 1), color=_PARTLY, zorder=0)
+    axes.set(
+        xlabel='sequence length (frames)', ylabel='expected average overlap', ylim=(0, 1.02),
+        title='VOT: expected average overlap',
+    )  # fmt: skip
+    _tidy(axes)
+    axes.legend(fontsize=8, frameon=False)
+    return _png(figure)
+
+
+def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> bytes:
+    """Centre error and IoU over time, frames without the target shaded."""
+    first = results[0]
+    seconds = (np.array(first.stamps_ns, np.float64) - first.stamps_ns[0]) / 1e9
+    figure = _figure(9.5, 3.4)
+    error_axes = figure.add_subplot(2, 1, 1)
+    iou_axes = figure.add_subplot(2, 1, 2, sharex=error_axes)
+    absent = ~first.frames.there
+    partly = ~absent & (np.nan_to_num(first.fraction, nan=1.0) < 0.5)
+    for axes in (error_axes, iou_axes):
+        _shade(axes, seconds, absent, _ABSENT)
+        _shade(axes, seconds, partly, _PARTLY)
+        _tidy(axes)
+    for row, r in enumerate(results):
+        c, color = r.frames, palette[r.tracker]
+        error_axes.plot(
+            seconds, np.minimum(c.error, ERROR_CAP_PX), color=color, lw=1.2, label=r.tracker
+        )
+        shown = np.where(c.there, np.nan_to_num(c.overlap), np.nan)
+        iou_axes.plot(seconds, shown, color=color, lw=1.2)
+        false = c.said & ~c.there
+        iou_axes.plot(
+            seconds[false], np.full(false.sum(), -0.07 - 0.07 * row), '|', color=color, ms=4, mew=1
+        )
+    iou_axes.axhline(0.5, color='#888888', lw=0.8, ls=':')
+    error_axes.set(ylabel='centre error (px)', ylim=(0, ERROR_CAP_PX * 1.03))
+    error_axes.tick_params(labelbottom=False)
+    error_axes.legend(
+        fontsize=7.5, frameon=False, ncols=min(6, len(results)), loc='lower left',
+        bbox_to_anchor=(0, 0.98), borderaxespad=0.2,
+    )  # fmt: skip
+    iou_axes.set(
+        ylabel='IoU', xlabel='time (s)', ylim=(-0.07 * (len(results) + 1), 1.03),
+        xlim=(seconds[0], max(seconds[-1], seconds[0] + 1e-3)), yticks=(0, 0.5, 1),
+    )  # fmt: skip
+    return _png(figure, 90)
+
+
+def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
+    if not mask.any():
+        return
+    step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    for start, stop in edges.reshape(-1, 2):
+        axes.axvspan(seconds[start] - step / 2, seconds[stop - 1] + step / 2, color=color, lw=0)
+
+
+def _mean(curves: Sequence[Array], size: int) -> Array:
+    mean: Array = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
+    return mean
+
+
+def _figure(width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), layout='constrained')
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _tidy(axes: Axes) -> None:
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.grid(color='#e3e5e8', lw=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8)
+
+
+def _png(figure: Figure, dpi: int = _DPI) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format='png', dpi=dpi)
+    return buffer.getvalue()

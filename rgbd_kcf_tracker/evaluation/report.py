@@ -1,0 +1,163 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A report folder: one self-contained page, and the same numbers as CSV and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rgbd_kcf_tracker
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation import page, plots, tables, thesis_tables
+from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.jobs import Failure
+from rgbd_kcf_tracker.evaluation.measured import Measured
+from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
+from rgbd_kcf_tracker.evaluation.store import slug, write_atomically, write_json
+from rgbd_kcf_tracker.evaluation.table import Table
+
+PAGE = 'index.html'
+PER_FRAME = 'per_frame.csv'
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """What stands at the top of a report.
+
+    Attributes:
+        dataset: as the user gave it.
+        options: in words.
+        command: that was typed, or ''.
+        ablated: names of variants whose ingredients were switched off in turn.
+    """
+
+    dataset: str
+    options: str = 'as they are'
+    command: str = ''
+    ablated: tuple[str, ...] = ()
+
+
+def write_report(
+    folder: Path,
+    collected: Collected,
+    contenders: Sequence[Contender],
+    failures: Sequence[Failure],
+    heading: Heading,
+) -> Measured:
+    """Write ``per_frame.csv``, then everything else from that file.
+
+    Returns:
+        What was measured, for printing.
+
+    Raises:
+        DatasetError: where nothing could be measured.
+    """
+    write_per_frame(folder / PER_FRAME, collected.results)
+    measured = Measured(read_per_frame(folder / PER_FRAME), collected.infos)
+    _write_failures(folder / 'failures.txt', failures)
+    if not measured.results:
+        raise DatasetError(_why_nothing(failures))
+
+    curves = plots.mean_curves(measured)
+    long_term, long_curves = tables.long_term(measured)
+    reliability, reliabilities = tables.reliability(measured)
+    protocols = [t for t in (tables.otb_protocol(measured),) if t is not None]
+    if collected.short_term:
+        protocols.append(thesis_tables.short_term(collected.short_term))
+    content: dict[str, Any] = {
+        'overview': tables.overview(measured),
+        'ablations': [tables.ablation(measured, name) for name in heading.ablated],
+        'scenario_tables': tables.by_scenario(measured),
+        'thesis_tables': thesis_tables.all_tables(measured),
+        'protocols': protocols,
+        'sequence_table': tables.by_sequence(measured),
+        'long_term': long_term,
+        'reliability': reliability,
+    }
+    every = _all_tables(content)
+    for table in every:
+        write_atomically(folder / 'tables' / f'{slug(table.key)}.csv', table.csv())
+    numbers = _numbers(measured, every, curves, contenders, failures, heading)
+    write_json(folder / 'report.json', numbers, indent=1)
+
+    palette = plots.colors(measured.trackers)
+    main = main_tracker(measured.trackers, heading.ablated)
+    content |= {
+        'curves': page.uri(plots.curve_plots(measured, curves)),
+        'scenario_plot': page.uri(plots.scenario_plot(measured, main)),
+        'long_term_plot': page.uri(plots.long_term_plot(long_curves)),
+        'reliability_plot': page.uri(plots.reliability_plot(reliabilities)),
+        'strips': page.strip_figures(folder, measured, main, palette),
+        'sequence_plots': page.sequence_figures(measured, palette),
+        'failures': failures,
+        'unmeasured': collected.unmeasured,
+        'main': main,
+        'palette': palette,
+        'dataset': heading.dataset,
+        'options': heading.options,
+        'command': heading.command,
+    }
+    if collected.short_term:
+        content['eao_plot'] = page.uri(plots.expected_overlap_plot(collected.short_term))
+    write_atomically(folder / PAGE, page.render(measured, content))
+    return measured
+
+
+def main_tracker(trackers: Sequence[str], ablated: Sequence[str] = ()) -> str:
+    """The tracker whose best and worst sequences are shown: the ablated, metric, or the last."""
+    return next((name for name in (*ablated, 'metric') if name in trackers), trackers[-1])
+
+
+def _all_tables(content: Mapping[str, Any]) -> list[Table]:
+    found: list[Table] = []
+    for value in content.values():
+        found += value if isinstance(value, list) else [value]
+    return found
+
+
+def _numbers(
+    measured: Measured,
+    every: Sequence[Table],
+    curves: Mapping[str, Mapping[str, Any]],
+    contenders: Sequence[Contender],
+    failures: Sequence[Failure],
+    heading: Heading,
+) -> dict[str, Any]:
+    return {
+        'version': rgbd_kcf_tracker.__version__,
+        'dataset': heading.dataset,
+        'options': heading.options,
+        'trackers': {
+            c.name: {'kind': c.kind, 'target': c.target, **dict(c.overrides)} for c in contenders
+        },
+        'sequences': {
+            name: {'scenario': i.scenario, 'kind': i.kind, 'categories': dict(i.categories)}
+            for name, i in measured.infos.items()
+        },
+        'tables': {
+            t.key: {'title': t.title, 'columns': t.columns, 'rows': t.rows, 'note': t.note}
+            for t in every
+        },
+        'curves': curves,
+        'failures': [
+            {'sequence': f.sequence, 'tracker': f.tracker, 'reason': f.reason} for f in failures
+        ],
+    }
+
+
+def _write_failures(path: Path, failures: Sequence[Failure]) -> None:
+    if not failures:
+        path.unlink(missing_ok=True)
+        return
+    lines = [f'{f.sequence} {f.tracker}'.strip() + f': {f.reason}' for f in failures]
+    write_atomically(path, '\n\n'.join(lines) + '\n')
+
+
+def _why_nothing(failures: Sequence[Failure]) -> str:
+    if failures:
+        return f'nothing was measured: {failures[0].sequence}: {failures[0].reason}'
+    return 'nothing was measured: none of the sequences has ground truth'

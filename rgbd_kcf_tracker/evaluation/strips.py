@@ -1,0 +1,138 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Picture strips: a row of small frames of a sequence with every tracker's box drawn in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.evaluation.store import slug
+
+FRAMES = 8
+COLUMNS = 4
+_TRUTH = (255, 255, 255)
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+Picture = npt.NDArray[np.uint8]
+
+
+def strip(
+    folder: Path,
+    sequence: str,
+    scale: float,
+    truth: Array,
+    boxes: Mapping[str, Array],
+    palette: Mapping[str, str],
+    interesting: npt.NDArray[np.bool_],
+) -> bytes | None:
+    """A strip as JPEG; None where no picture was kept.
+
+    Args:
+        folder: of the run.
+        sequence: its name.
+        scale: of the pictures that were kept.
+        truth: ``(N, 4)`` visible part, drawn white and dashed.
+        boxes: per tracker ``(N, 4)``, drawn in the tracker's colour.
+        palette: colours as ``#rrggbb``.
+        interesting: ``(N,)`` frames that should be among those shown (occlusion, errors).
+    """
+    pictures = sorted((folder / 'thumbs' / slug(sequence)).glob('*.jpg'))
+    indices = np.array([int(p.stem) for p in pictures if int(p.stem) < len(truth)], np.int64)
+    if not len(indices):
+        return None
+    tiles = []
+    for i in choose(indices, interesting):
+        path = folder / 'thumbs' / slug(sequence) / f'{i:06d}.jpg'
+        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        if picture is None:
+            continue
+        image: Picture = np.asarray(picture, np.uint8)
+        _dashed(image, truth[i] * scale)
+        missing = []
+        for name, own in boxes.items():
+            if np.isnan(own[i, 0]):
+                missing.append(name)
+            else:
+                _rectangle(image, own[i] * scale, _bgr(palette[name]))
+        _label(image, f'{i}', missing, palette, np.isnan(truth[i, 0]))
+        tiles.append(image)
+    if not tiles:
+        return None
+    done, data = cv2.imencode('.jpg', _montage(tiles), [cv2.IMWRITE_JPEG_QUALITY, 82])
+    return data.tobytes() if done else None
+
+
+def choose(
+    indices: npt.NDArray[np.int64], interesting: npt.NDArray[np.bool_], count: int = FRAMES
+) -> list[int]:
+    """Up to ``count`` of the kept frames: half evenly spread, half from the interesting ones."""
+    if len(indices) <= count:
+        return [int(i) for i in indices]
+    special = indices[interesting[indices]]
+    wanted = set(_spread(indices, count - min(len(special), count // 2)))
+    rest = [i for i in special if int(i) not in wanted]
+    wanted |= set(_spread(np.array(rest, np.int64), count - len(wanted)))
+    others = [int(i) for i in indices if int(i) not in wanted]
+    wanted |= set(_spread(np.array(others, np.int64), count - len(wanted)))
+    return sorted(wanted)
+
+
+def _spread(values: npt.NDArray[np.int64], count: int) -> list[int]:
+    if not len(values) or count <= 0:
+        return []
+    places = np.linspace(0, len(values) - 1, min(count, len(values))).round().astype(np.int64)
+    return [int(v) for v in values[places]]
+
+
+def _montage(tiles: list[Picture]) -> Picture:
+    height, width = tiles[0].shape[:2]
+    rows = -(-len(tiles) // COLUMNS)
+    gap = 4
+    across = min(COLUMNS, len(tiles))
+    sheet = np.full((rows * (height + gap) - gap, across * (width + gap) - gap, 3), 255, np.uint8)
+    for n, tile in enumerate(tiles):
+        y, x = (n // COLUMNS) * (height + gap), (n % COLUMNS) * (width + gap)
+        sheet[y : y + height, x : x + width] = tile[:height, :width]
+    return sheet
+
+
+def _rectangle(image: Picture, box: Array, color: tuple[int, int, int]) -> None:
+    x, y, width, height = (round(float(v)) for v in box)
+    cv2.rectangle(image, (x, y), (x + width, y + height), color, 2, cv2.LINE_AA)
+
+
+def _dashed(image: Picture, box: Array) -> None:
+    if np.isnan(box[0]):
+        return
+    left, top = int(box[0]), int(box[1])
+    right, bottom = int(box[0] + box[2]), int(box[1] + box[3])
+    for x in range(left, right, 8):
+        for y in (top, bottom):
+            cv2.line(image, (x, y), (min(x + 4, right), y), _TRUTH, 1)
+    for y in range(top, bottom, 8):
+        for x in (left, right):
+            cv2.line(image, (x, y), (x, min(y + 4, bottom)), _TRUTH, 1)
+
+
+def _label(
+    image: Picture, text: str, missing: list[str], palette: Mapping[str, str], absent: bool
+) -> None:
+    """Frame number, 'absent' where the target is, a dot for each tracker without a box."""
+    words = f'{text}  absent' if absent else text
+    (width, height), _ = cv2.getTextSize(words, _FONT, 0.42, 1)
+    cv2.rectangle(image, (0, 0), (width + 8 + 13 * len(missing), height + 8), (40, 40, 40), -1)
+    cv2.putText(image, words, (4, height + 3), _FONT, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
+    for n, name in enumerate(missing):
+        center = (width + 12 + 13 * n, (height + 8) // 2)
+        cv2.circle(image, center, 4, _bgr(palette[name]), -1, cv2.LINE_AA)
+
+
+def _bgr(color: str) -> tuple[int, int, int]:
+    return int(color[5:7], 16), int(color[3:5], 16), int(color[1:3], 16)

@@ -1,0 +1,254 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The tables of a report that are ours; those in the thesis's shape are in ``thesis_tables``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rgbd_kcf_tracker.evaluation.measured import Measured
+from rgbd_kcf_tracker.evaluation.metrics import (
+    calibration,
+    longterm,
+    otb,
+)
+from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU, UNDETERMINED, Confusion
+from rgbd_kcf_tracker.evaluation.table import Cell, Table
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A measure as tables show it: its heading, its value from 0 to 1 times ``scale``."""
+
+    name: str
+    heading: str
+    scale: float = 100.0
+
+
+OVERVIEW: tuple[Column, ...] = (
+    Column('success', 'success %'),
+    Column('success_auc', 'success AUC %'),
+    Column('iou', 'IoU %'),
+    Column('recall_of_absence', 'recall of absence %'),
+    Column('tp', 'TP %'),
+    Column('fp', 'FP %'),
+    Column('fn', 'FN %'),
+    Column('tn', 'TN %'),
+    Column('precision_20px', 'P@20px %'),
+    Column('otb_auc', 'OTB AUC %'),
+    Column('center_error', 'centre error px', 1.0),
+    Column('center_error_x', 'x px', 1.0),
+    Column('center_error_y', 'y px', 1.0),
+)
+
+BY_SCENARIO: tuple[Column, ...] = (
+    Column('success', 'success %'),
+    Column('iou', 'IoU %'),
+    Column('recall_of_absence', 'recall of absence %'),
+    Column('tp', 'TP %'),
+    Column('tn', 'TN %'),
+    Column('precision_20px', 'P@20px %'),
+)
+
+
+def overview(measured: Measured) -> Table:
+    """Every measure of every tracker, mean over sequences, with a 95 % interval of success."""
+    rows = []
+    for tracker in measured.trackers:
+        m = measured.mean(tracker)
+        low, high = bootstrap_interval(measured.values(tracker, 'success'))
+        ms = np.concatenate([r.milliseconds[1:] for r in measured.results if r.tracker == tracker])
+        ms = ms[~np.isnan(ms)]
+        rows.append(
+            (
+                tracker,
+                *(scaled(getattr(m, c.name), c.scale) for c in OVERVIEW[:1]),
+                '' if math.isnan(low) else f'{100 * low:.1f} to {100 * high:.1f}',
+                *(scaled(getattr(m, c.name), c.scale) for c in OVERVIEW[1:]),
+                float(np.median(ms)) if len(ms) else None,
+                float(np.percentile(ms, 95)) if len(ms) else None,
+            )
+        )
+    headings = [c.heading for c in OVERVIEW]
+    return Table(
+        'overview',
+        f'All measures, mean over {len(measured.sequences)} sequences',
+        ('tracker', headings[0], '95 % interval', *headings[1:], 'median ms', 'p95 ms'),
+        tuple(rows),
+        note='The interval is of the mean over sequences (bootstrap). Times are of one update on '
+        'one core, taken while other processes may have run.',
+    )
+
+
+def by_scenario(measured: Measured) -> list[Table]:
+    """One table per measure: scenarios down, trackers across."""
+    tables = []
+    for column in BY_SCENARIO:
+        rows: list[tuple[Cell, ...]] = []
+        for scenario in measured.scenarios:
+            count = sum(measured.infos[s].scenario == scenario for s in measured.sequences)
+            means = (measured.mean(t, scenario) for t in measured.trackers)
+            cells = (scaled(getattr(m, column.name), column.scale) for m in means)
+            rows.append((scenario, count, *cells))
+        total = (measured.mean(t) for t in measured.trackers)
+        rows.append(
+            (
+                'all',
+                len(measured.sequences),
+                *(scaled(getattr(m, column.name), column.scale) for m in total),
+            )
+        )
+        tables.append(
+            Table(
+                f'scenario_{column.name}',
+                f'{column.heading} by scenario',
+                ('scenario', 'sequences', *measured.trackers),
+                tuple(rows),
+            )
+        )
+    return tables
+
+
+def by_sequence(measured: Measured) -> Table:
+    """Success and IoU of every tracker on every sequence."""
+    columns = ['sequence', 'scenario', 'frames']
+    columns += [f'{t}: {what}' for t in measured.trackers for what in ('success %', 'IoU %')]
+    rows = []
+    for sequence in measured.sequences:
+        cells: list[Cell] = []
+        frames = 0
+        for tracker in measured.trackers:
+            m, r = measured.of(tracker, sequence), measured.result(tracker, sequence)
+            frames = len(r.stamps_ns) if r else frames
+            cells += [scaled(m.success, 100), scaled(m.iou, 100)] if m else [None, None]
+        rows.append((sequence, measured.infos[sequence].scenario, frames, *cells))
+    return Table('sequences', 'Every sequence', tuple(columns), tuple(rows))
+
+
+def ablation(measured: Measured, base: str) -> Table:
+    """The variant, and what it loses without each of its ingredients."""
+    columns = ('success', 'iou', 'recall_of_absence', 'tp', 'precision_20px')
+    full = measured.mean(base)
+    rows = []
+    for tracker in measured.trackers:
+        if tracker != base and not tracker.startswith(f'{base} without '):
+            continue
+        m = measured.mean(tracker)
+        cells: list[Cell] = []
+        for name in columns:
+            cells.append(scaled(getattr(m, name), 100))
+            if name in ('success', 'iou'):
+                loss = getattr(m, name) - getattr(full, name)
+                cells.append(None if tracker == base else scaled(loss, 100))
+        rows.append((tracker, *cells))
+    headings = (
+        'success %', 'change', 'IoU %', 'change', 'recall of absence %', 'TP %', 'P@20px %',
+    )  # fmt: skip
+    return Table(
+        f'ablation_{base}',
+        f'What {base} loses without each ingredient, mean over {len(measured.sequences)} sequences',
+        ('tracker', *headings),
+        tuple(rows),
+        note='Each row switches one parameter use_... off; changes are in percentage points.',
+    )
+
+
+def otb_protocol(measured: Measured) -> Table | None:
+    """OTB's own numbers, the first frame counted as the benchmark does; None elsewhere."""
+    kept = [s for s in measured.sequences if measured.infos[s].kind == 'otb']
+    if not kept:
+        return None
+    rows = []
+    for tracker in measured.trackers:
+        own = [r.frames for s in kept if (r := measured.result(tracker, s)) is not None]
+        precision = [otb.precision_at_20(otb.precision_curve(f.error[f.there])) for f in own]
+        auc = [otb.area_under_curve(otb.success_curve(f.overlap[f.there])) for f in own]
+        rows.append((tracker, len(own), float(np.mean(precision)), float(np.mean(auc))))
+    return Table(
+        'otb',
+        'OTB one-pass evaluation',
+        ('tracker', 'sequences', 'precision at 20 px', 'AUC'),
+        tuple(rows),
+        digits=3,
+        note='As the benchmark counts, the first frame included: to be held against its papers.',
+    )
+
+
+def confusion_cells(matrix: Confusion) -> tuple[Cell, ...]:
+    """TP, FP, FN, TN in percent, or that they cannot be determined."""
+    values = (matrix.tp, matrix.fp, matrix.fn, matrix.tn)
+    return tuple(UNDETERMINED if v is None else 100 * v for v in values)
+
+
+def long_term(measured: Measured) -> tuple[Table, dict[str, longterm.LongTerm]]:
+    """Precision, recall and F-score from the published scores, and the curves behind them."""
+    rows, curves = [], {}
+    for tracker in measured.trackers:
+        scored = [
+            longterm.ScoredSequence(
+                np.nan_to_num(r.counted.overlap), r.counted.score, int(r.counted.there.sum())
+            )
+            for r in measured.results
+            if r.tracker == tracker
+        ]
+        curves[tracker] = result = longterm.evaluate(scored)
+        cells = (result.precision, result.recall, result.f_score)
+        rows.append((tracker, *(scaled(v, 100) for v in cells)))
+    return Table(
+        'long_term',
+        'Long-term precision, recall and F-score',
+        ('tracker', 'precision %', 'recall %', 'F-score %'),
+        tuple(rows),
+        note='At the threshold of the published score with the best F-score (Lukezic et al. 2018).',
+        best='max',
+    ), curves
+
+
+def reliability(measured: Measured) -> tuple[Table, dict[str, calibration.Reliability]]:
+    """Whether scores mean what they say: per tenth of score, the share of boxes that are right."""
+    tables, rows = {}, []
+    for tracker in measured.trackers:
+        own = [r.counted for r in measured.results if r.tracker == tracker]
+        scores = np.concatenate([c.score[c.said] for c in own])
+        hits = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= HIT_IOU for c in own])
+        tables[tracker] = table = calibration.reliability(scores, hits)
+        rows.append(
+            (
+                tracker,
+                int(table.counts.sum()),
+                scaled(table.expected_error, 100),
+                table.brier,
+                *(scaled(v, 100) for v in table.hit_rate),
+            )
+        )
+    edges = next(iter(tables.values())).edges if tables else np.linspace(0, 1, 11)
+    bins = [f'{a:.1f}-{b:.1f}' for a, b in pairwise(edges)]
+    return Table(
+        'reliability',
+        'Reliability of scores: percent of boxes that are right, by published score',
+        ('tracker', 'boxes', 'calibration error %', 'Brier', *bins),
+        tuple(rows),
+        digits=2,
+        note=f'A box is right where its IoU with the visible target is at least {HIT_IOU}.',
+    ), tables
+
+
+def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, float]:
+    """95 % interval of the mean of independent sequences; NaN below two of them."""
+    known = values[~np.isnan(values)]
+    if len(known) < 2:
+        return math.nan, math.nan
+    rng = np.random.default_rng(0)
+    means = rng.choice(known, (2000, len(known))).mean(axis=1)
+    low, high = np.percentile(means, [2.5, 97.5])
+    return float(low), float(high)
+
+
+def scaled(value: float, scale: float) -> float | None:
+    """``value`` times ``scale``, None for NaN."""
+    return None if math.isnan(value) else value * scale
