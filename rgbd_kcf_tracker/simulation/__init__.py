@@ -10,7 +10,7 @@
 """
 
 from rgbd_kcf_tracker.simulation.build import check_request, kinect2_intrinsics, simulate
-from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence
+from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence, Truth
 from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario
 
 __all__ = [
@@ -18,6 +18,7 @@ __all__ = [
     'Scenario',
     'SimulatedFrame',
     'SimulatedSequence',
+    'Truth',
     'check_request',
     'kinect2_intrinsics',
     'simulate',

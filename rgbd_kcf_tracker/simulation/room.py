@@ -186,7 +186,7 @@ def random_room(
     wall = textures.wallpaper(rng, 512, 1400)
     side = wall if rng.uniform() < 0.6 else textures.wallpaper(rng, 512, 1400)
     top_left = -half_width * x - height * y
-    ceiling = textures.paint(rng, 256, 256, (225, 228, 228))
+    ceiling = textures.ceiling(rng, 512, 512)
     room.faces = [
         face(top_left + depth * z, wide * x, height * y, wall),
         face(top_left + near * z, deep * z, height * y, side, float(rng.uniform(0.75, 1))),

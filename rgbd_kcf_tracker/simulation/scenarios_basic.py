@@ -28,7 +28,7 @@ def stroll(
 @scenario('one person walks to and fro in an ordinary room')
 def normal(stage: Stage) -> Scene:
     """The thesis's normal case."""
-    way = stroll(stage, stage.uniform(0.7, 1.2), 2)
+    way = stroll(stage, stage.uniform(0.6, 1.3), int(stage.rng.integers(2, 4)), z=(1.7, 4.3))
     return stage.scene([stage.walk(stage.person(), way)], min(way[-1][0] + 0.5, 8.0))
 
 

@@ -34,7 +34,7 @@ def occlusion(stage: Stage) -> Scene:
     )  # fmt: skip
     way = route(points, speed)
     scene.actors = [stage.walk(stage.person(), way)]
-    scene.duration_s = min(way[-1][0] + 0.5, 9.0)
+    scene.duration_s = way[-1][0] + 0.5
     return scene
 
 
@@ -66,47 +66,77 @@ def long_occlusion(stage: Stage) -> Scene:
 @scenario('the target is hidden a few frames after the start')
 def early_occlusion(stage: Stage) -> Scene:
     """A fifth to half a second after the given box."""
-    far, near, side = stage.uniform(2.8, 3.4), stage.uniform(1.5, 2.0), stage.sign()
+    far, near, side = stage.uniform(2.8, 3.5), stage.uniform(1.1, 1.45), stage.sign()
     x = stage.x(stage.uniform(-0.3, 0.3), far)
     meet = x * near / far
-    speed = stage.uniform(1.3, 1.7)
-    begin = meet - side * (speed * stage.uniform(0.25, 0.5) + 0.55 * near / far + 0.3)
-    cast: list[Actor] = [
-        stage.walk(stage.person(), [(0, x, far), (3, x, far), (5, x + 0.8 * side, far)],
-                   heading=[(0, 0.0), (3, 0.2), (3.4, 1.5 * side)]),
-        stage.walk(stage.person(), route([(begin, near), (meet, near), (meet, near),
-                                          (meet + side * 3.5, near)], speed)),
-    ]  # fmt: skip
-    return stage.scene(cast, 5.5)
+    speed = stage.uniform(1.2, 1.7)
+    # where the passer-by's edge meets the target's edge, and before that the first free frames
+    begin = meet - side * (speed * stage.uniform(0.2, 0.5) + 0.3 * near / far + 0.22)
+    pause = stage.uniform(0.3, 1.2)
+    there = route([(begin, near), (meet, near)], speed)
+    back = route([(meet, near), (meet + side * 3.0, near)], speed, there[-1][0] + pause)
+    target = stage.walk(
+        stage.person(),
+        [(0, x, far), (3, x, far), (5, x + 0.8 * side, far)],
+        heading=[(0, 0.0), (3, 0.2), (3.4, 1.5 * side)],
+    )
+    return stage.scene([target, stage.walk(stage.person(), there + back)], 5.5)
 
 
-@scenario('the target and another person walk past each other')
+@scenario('the target and another person walk past each other, then one overtakes the other')
 def crossing(stage: Stage) -> Scene:
     """The thesis's moving target and moving occluder."""
-    far, near, side = stage.uniform(2.7, 3.6), stage.uniform(1.5, 2.1), stage.sign()
-    way = route([(stage.x(side * s, far), far) for s in (-0.7, 0.7, 0.7, -0.6)],
-                stage.uniform(0.7, 1.1))  # fmt: skip
-    other = route([(stage.x(side * s, near), near) for s in (1.4, -1.4, -1.4, 1.4)],
-                  stage.uniform(0.7, 1.2), stage.uniform(0.0, 0.8))  # fmt: skip
-    cast: list[Actor] = [stage.walk(stage.person(), way), stage.walk(stage.person(), other)]
-    return stage.scene(cast, min(way[-1][0] + 0.5, 8.0))
+    far, near, side = stage.uniform(2.7, 3.8), stage.uniform(1.15, 1.6), stage.sign()
+    speed = stage.uniform(0.7, 1.1)
+    way = route([(stage.x(side * s, far), far) for s in (-0.7, 0.7, 0.7, -0.75)], speed)
+    half, end = way[1][0], way[-1][0]
+    # one comes towards the target, another goes the target's way a little faster
+    first, second = stage.uniform(0.3, 0.7) * half, half + stage.uniform(0.4, 0.6) * (end - half)
+    at = np.interp([first, second], [t for t, _, _ in way], [x for _, x, _ in way]) * near / far
+    pace = -stage.uniform(0.7, 1.1) * side
+    slow = speed * near / far * stage.uniform(1.3, 2.0) * -side
+    others = [
+        [(t - 4.0, float(x) - 4.0 * pace, near), (t + 4.0, float(x) + 4.0 * pace, near)]
+        for t, x, pace in ((first, at[0], pace), (second, at[1], slow))
+    ]
+    cast: list[Actor] = [stage.walk(stage.person(), way)]
+    cast += [stage.walk(stage.person(), keys) for keys in others]
+    return stage.scene(cast, end + 0.5)
 
 
-@scenario('somebody passes before a standing target, and back')
+@scenario('somebody passes before a standing target, and back, and may stop there')
 def passer_by(stage: Stage) -> Scene:
     """The thesis's standing target and moving occluder."""
-    far, near, side = stage.uniform(2.6, 3.6), stage.uniform(1.3, 2.0), stage.sign()
+    far, near, side = stage.uniform(2.6, 3.6), stage.uniform(1.05, 1.45), stage.sign()
     x = stage.x(stage.uniform(-0.3, 0.3), far)
-    turn = stage.uniform(-1, 1)
-    other: list[Point] = [(stage.x(side * s, near), near) for s in (-1.4, 1.4, 1.4, -1.4)]
-    way = route(other, stage.uniform(0.7, 1.2), stage.uniform(-0.2, 0.6))
+    turn, meet = stage.uniform(-1, 1), x * near / far
+    speed = stage.uniform(0.7, 1.2)
+    out = stage.x(1.5, near)
+    there = route([(-side * out, near), (meet, near)], speed, stage.uniform(-0.6, 0.4))
+    pause = stage.uniform(0.3, 1.5) if stage.rng.uniform() < 0.5 else 0.0
+    on = route([(meet, near), (side * out, near)], speed, there[-1][0] + pause)
+    back = route([(side * out, near), (-side * out, near)], speed, on[-1][0] + 0.5)
     channels = {'spread': [(0.0, 0.0), (2.5, 0.0), (3.0, 0.35), (4.0, 0.0)]}
     cast: list[Actor] = [
         stage.walk(stage.person(), [(0, x, far)], heading=[(0, turn), (3, turn), (4, -turn)],
                    channels=channels),
-        stage.walk(stage.person(), way),
+        stage.walk(stage.person(), there + on + back),
     ]  # fmt: skip
-    return stage.scene(cast, min(way[-1][0], 8.0))
+    return stage.scene(cast, min(back[-1][0], 9.0))
+
+
+@scenario('a hand-held camera, a walking target, and a passer-by who hides it')
+def camera_occlusion(stage: Stage) -> Scene:
+    """Camera motion and occlusion together."""
+    far, near, side = stage.uniform(2.7, 3.6), stage.uniform(1.2, 1.6), stage.sign()
+    way = route([(stage.x(side * s, far), far) for s in (-0.5, 0.5, 0.5, -0.4)],
+                stage.uniform(0.6, 0.9))  # fmt: skip
+    out = stage.x(1.6, near)
+    begin = stage.uniform(0.1, 0.5) * way[-1][0]
+    other = route([(side * out, near), (-side * out, near)], stage.uniform(0.7, 1.1), begin)
+    cast: list[Actor] = [stage.walk(stage.person(), way), stage.walk(stage.person(), other)]
+    camera = stage.hand_held(stage.uniform(0.003, 0.01))
+    return stage.scene(cast, min(way[-1][0] + 0.3, 8.0), camera=camera)
 
 
 @scenario('a box on wheels is pushed before the standing target and stays for a while')
@@ -175,9 +205,12 @@ def touching(stage: Stage) -> Scene:
     pause = stage.uniform(0.3, 1.0)
     there = route([(x - side * 1.9, near), (x - side * 0.02, near)], stage.uniform(0.7, 1.0), 0.4)
     back = route([(x - side * 0.02, near), (x + side * 2.2, near)], 0.9, there[-1][0] + pause)
+    arrive, leave, ahead = there[-1][0], back[0][0], 1.5 * side
+    facing = [(0.0, ahead), (arrive - 0.1, ahead), (arrive + 0.2, 0.0), (leave, 0.0)]
+    facing.append((leave + 0.3, ahead))
     cast: list[Actor] = [
         stage.walk(stage.person(), [(0, x, z)], heading=[(0, stage.uniform(-0.8, 0.8))]),
-        stage.walk(stage.person(), there + back),
+        stage.walk(stage.person(), there + back, facing if stage.rng.uniform() < 0.6 else None),
     ]
     return stage.scene(cast, min(back[-1][0] + 0.4, 8.0))
 

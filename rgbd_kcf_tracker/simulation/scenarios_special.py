@@ -227,7 +227,7 @@ def carried_mug(stage: Stage) -> Scene:
     """A small target that moves with somebody bigger."""
     person = stage.person()
     side = stage.sign()
-    z = stage.uniform(1.2, 1.7)
+    z = stage.uniform(1.5, 2.0)
     points: list[Point] = [(stage.x(side * s, z + stage.uniform(-0.2, 0.2)), z)
                            for s in (-0.45, 0.4, 0.45, -0.4)]  # fmt: skip
     way = route(points, stage.uniform(0.5, 0.8))

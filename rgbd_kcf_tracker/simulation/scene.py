@@ -78,12 +78,11 @@ class Scene:
     sun: Vector = field(default_factory=lambda: np.array([-0.4, -0.8, -0.45]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SimulatedFrame:
-    """A frame and the truth about it.
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where the target is at one moment.
 
     Attributes:
-        frame: what the camera recorded.
         visible: box of the target's visible part; None where less than a fifth of it shows.
         body: box of the whole target, hidden parts and those beyond the image's border included;
             None where it is wholly outside the image.
@@ -92,11 +91,43 @@ class SimulatedFrame:
         distance: of the target's middle along the optical axis, metres.
     """
 
-    frame: Frame
     visible: Box | None
     body: Box | None
     visible_fraction: float
     distance: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedFrame:
+    """A frame and the truth about it.
+
+    Attributes:
+        frame: what the camera recorded.
+        truth: where the target is.
+    """
+
+    frame: Frame
+    truth: Truth
+
+    @property
+    def visible(self) -> Box | None:
+        """See `Truth`."""
+        return self.truth.visible
+
+    @property
+    def body(self) -> Box | None:
+        """See `Truth`."""
+        return self.truth.body
+
+    @property
+    def visible_fraction(self) -> float:
+        """See `Truth`."""
+        return self.truth.visible_fraction
+
+    @property
+    def distance(self) -> float:
+        """See `Truth`."""
+        return self.truth.distance
 
 
 class SimulatedSequence:
@@ -128,11 +159,7 @@ class SimulatedSequence:
 
     def __getitem__(self, index: int) -> SimulatedFrame:
         """Render one frame."""
-        if index < 0:
-            index += self._count
-        if not 0 <= index < self._count:
-            raise IndexError(f'frame {index} of a sequence of {self._count}')
-        offset_ns = round(index * 1e9 / self.rate_hz)
+        offset_ns = self._offset_ns(index)
         t = offset_ns * 1e-9
         rng = np.random.default_rng([*self._key, offset_ns // 1000])
         picture = _Picture(self, t)
@@ -144,7 +171,19 @@ class SimulatedSequence:
             blind = any(a <= t < b for a, b in options.no_target_depth)
             depth = self._sensor.depth(later.depth, later.target_mask if blind else None, rng)
         frame = Frame(color, depth, EPOCH_NS + offset_ns, self.intrinsics)
-        return picture.truth(frame)
+        return SimulatedFrame(frame, picture.truth())
+
+    def truth(self, index: int) -> Truth:
+        """The truth about one frame alone, several times faster than the frame."""
+        return _Picture(self, self._offset_ns(index) * 1e-9, shade=False).truth()
+
+    def _offset_ns(self, index: int) -> int:
+        """Nanoseconds from the start to a frame."""
+        if index < 0:
+            index += self._count
+        if not 0 <= index < self._count:
+            raise IndexError(f'frame {index} of a sequence of {self._count}')
+        return round(index * 1e9 / self.rate_hz)
 
     def background(self, view: View) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """The empty room; drawn once where the camera is fixed."""
@@ -285,19 +324,19 @@ class _Picture:
         """Pixels in which the target is seen."""
         return np.asarray(self.owner == TARGET)
 
-    def truth(self, frame: Frame) -> SimulatedFrame:
-        """The frame with the exact boxes."""
+    def truth(self) -> Truth:
+        """The exact boxes."""
         centre = self.scene.actors[0].centre(self.t)
         distance = float((self.view.rotation @ (centre - self.view.place))[2])
         if self.body is None:
-            return SimulatedFrame(frame, None, None, 0.0, distance)
+            return Truth(None, None, 0.0, distance)
         whole = int(np.count_nonzero(self.body.mask))
         body = Box(self.body.x0, self.body.y0, self.body.z.shape[1], self.body.z.shape[0])
         mask = self.target_mask
         fraction = int(np.count_nonzero(mask)) / max(whole, 1)
         visible = mask_box(mask) if fraction >= HIDDEN_BELOW else None
         inside = body.clipped(self.width, self.height) is not None
-        return SimulatedFrame(frame, visible, body if inside else None, fraction, distance)
+        return Truth(visible, body if inside else None, fraction, distance)
 
 
 def mask_box(mask: npt.NDArray[np.bool_]) -> Box | None:

@@ -149,13 +149,13 @@ class Sensor:
         first = np.minimum.accumulate(shadow[:, ::-1], axis=1)[:, ::-1]
         bad |= shadow > first + np.float32(0.75)
         bad |= self._holes[self._cut(rng)]
-        bad |= z < np.float32(0.5)
         # beyond 4.5 m readings fall out more and more, beyond 8 m there are none
         bad |= (z - np.float32(4.5)) > np.float32(3.5) * np.sqrt(np.sqrt(chance))
         if self.options.narrow:
             bad[:, self._outside] = True
         np.copyto(z, mixed, where=edge)
         z += noise
+        bad |= z < np.float32(0.5)
         z *= 1000
         np.rint(z, out=z)
         z *= np.float32(0.001)

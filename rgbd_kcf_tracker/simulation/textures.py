@@ -235,6 +235,20 @@ def wallpaper(rng: np.random.Generator, h: int, w: int) -> Texture:
     return _shaded(rng, image, broad=0.05, grain=0.02)
 
 
+def ceiling(rng: np.random.Generator, h: int, w: int) -> Texture:
+    """A pale ceiling: plaster, or panels with lamps among them."""
+    grey = rng.uniform(205, 240)
+    image = _flat(h, w, (grey, grey, grey * 0.99))
+    if rng.uniform() < 0.6:
+        pitch = w // int(rng.integers(8, 16))
+        image[::pitch] *= 0.88
+        image[:, ::pitch] *= 0.88
+        for row in range(pitch, h - pitch, 3 * pitch):
+            for col in range(pitch, w - pitch, 3 * pitch):
+                image[row + 2 : row + pitch - 1, col + 2 : col + pitch - 1] = 255
+    return _shaded(rng, image, broad=0.012, grain=0.01)
+
+
 def floor(rng: np.random.Generator, h: int, w: int) -> Texture:
     """A floor: planks, tiles or carpet."""
     kind = rng.choice(['planks', 'tiles', 'carpet', 'concrete'])
