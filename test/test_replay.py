@@ -1,0 +1,260 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The replay node, alone and with the tracker node, as separate processes over DDS."""
+
+from __future__ import annotations
+
+import json
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+import replay_rig as rig
+
+from rgbd_kcf_tracker import create_tracker
+from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
+from rgbd_kcf_tracker.recordings.images import decode_depth
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon
+from rgbd_kcf_tracker.ros.messages import stamp_to_ns
+from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, VARIANTS
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return rig.write_bag(tmp_path_factory.mktemp('replay') / 'walk.mcap')
+
+
+@pytest.mark.parametrize('variant', sorted({'kcf', DEFAULT_VARIANT} & set(VARIANTS)))
+def test_lockstep_gives_the_boxes_of_the_engine(bag: Path, tmp_path: Path, variant: str) -> None:
+    """One box message for each pair, with the image's header, bit for bit the engine's box."""
+    report = tmp_path / 'report.json'
+    with (
+        rig.Listener() as heard,
+        rig.running_tracker(
+            tmp_path, variant=variant, init_box=rig.box_text(rig.first_box()), queue_policy='all'
+        ),
+    ):
+        heard.await_tracker()
+        status, output = rig.run_replay(tmp_path, bag=str(bag), lockstep=True, report=str(report))
+        assert status == 0, output
+    figures = json.loads(report.read_text())
+    count = len(rig.frames())
+    assert figures['pairs'] == figures['answers'] == count
+    assert figures['unanswered'] == figures['sent_again'] == 0
+
+    with open_recording(bag) as recording:
+        recorded = list(recording.frames())
+    tracker = create_tracker(variant)
+    tracks = [tracker.start(recorded[0], rig.first_box())]
+    tracks += [tracker.update(frame) for frame in recorded[1:]]
+    assert [stamp_to_ns(m.header.stamp) for m in heard.boxes] == [f.stamp_ns for f in recorded]
+    assert {m.header.frame_id for m in heard.boxes} == {'camera_optical_frame'}
+    for message, track in zip(heard.boxes, tracks, strict=True):
+        corners = [(p.x, p.y) for p in message.polygon.points]
+        if track.box is None:
+            assert corners == []
+            continue
+        box = track.box
+        expected = np.float32([(box.x, box.y), (box.right, box.y),
+                               (box.right, box.bottom), (box.x, box.bottom)])  # fmt: skip
+        np.testing.assert_array_equal(np.float32(corners), expected)
+
+
+def test_at_camera_rate_with_a_live_tracker(bag: Path, tmp_path: Path) -> None:
+    """30 Hz, nothing held back: the tracker keeps up, and time on the wire is recorded time."""
+    report = tmp_path / 'report.json'
+    with (
+        rig.Listener(clock=True) as heard,
+        rig.running_tracker(
+            tmp_path, variant='kcf', init_box=rig.box_text(rig.first_box()), queue_policy='all'
+        ),
+    ):
+        heard.await_tracker()
+        status, output = rig.run_replay(tmp_path, bag=str(bag), report=str(report))
+        assert status == 0, output
+    figures = json.loads(report.read_text())
+    count = len(rig.frames())
+    assert figures['color_images'] == figures['depth_images'] == count
+    assert figures['answers'] == len(heard.boxes) == count
+    assert figures['seconds'] > (count - 1) / 30 * 0.95
+    assert 0 < figures['latency_ms']['median'] < 1000
+    boxes = [box_from_polygon(m.polygon.points) for m in heard.boxes]
+    assert boxes[0] is not None
+    assert boxes[0].iou(rig.first_box()) > 0.99
+    stamps = [f.frame.stamp_ns for f in rig.frames()]
+    assert len(heard.clock) > count
+    assert heard.clock == sorted(heard.clock)
+    assert stamps[0] <= heard.clock[0]
+    assert heard.clock[-1] <= stamps[-1]
+
+
+def test_pixels_and_stamps_arrive_as_recorded(bag: Path, tmp_path: Path) -> None:
+    with rig.Listener(images=True) as heard:
+        status, output = rig.run_replay(tmp_path, bag=str(bag), rate=3.0)
+        assert status == 0, output
+        time.sleep(0.2)
+    wanted = rig.frames()
+    assert len(heard.colors) == len(heard.depths) == len(heard.infos) == len(wanted)
+    for made, color, depth, info in zip(
+        wanted, heard.colors, heard.depths, heard.infos, strict=True
+    ):
+        assert stamp_to_ns(color.header.stamp) == stamp_to_ns(depth.header.stamp)
+        assert stamp_to_ns(color.header.stamp) == made.frame.stamp_ns
+        assert bytes(color.data) == made.frame.color.tobytes()
+        assert info.k[0] == made.frame.intrinsics.fx
+        np.testing.assert_allclose(
+            np.nan_to_num(decode_depth(depth)), np.nan_to_num(made.frame.depth), atol=6e-4
+        )
+
+
+def test_start_topics_and_loop(bag: Path, tmp_path: Path) -> None:
+    """From the middle, colour alone, round and round with the recorded stamps, until SIGTERM."""
+    with rig.Listener(images=True) as heard:
+        process = rig.start(
+            'replay_main', folder=tmp_path, bag=str(bag), start=1.0, loop=True, rate=4.0,
+            topics='/color/image', lockstep=False,
+        )  # fmt: skip
+        try:
+            end = time.monotonic() + 30
+            while len(heard.colors) < 40 and time.monotonic() < end:
+                time.sleep(0.02)
+            process.send_signal(signal.SIGTERM)
+            began = time.monotonic()
+            output, _ = process.communicate(timeout=10)
+            assert time.monotonic() - began < 1.5
+        finally:
+            process.kill()
+    assert process.returncode == 0, output
+    assert 'Traceback' not in output
+    stamps = [stamp_to_ns(m.header.stamp) for m in heard.colors]
+    second = [f.frame.stamp_ns for f in rig.frames() if
+              f.frame.stamp_ns - rig.frames()[0].frame.stamp_ns >= 1_000_000_000]  # fmt: skip
+    assert stamps[: len(second)] == second
+    assert stamps[len(second) : 2 * len(second)] == second
+    assert not heard.depths
+
+
+def test_remapping_moves_the_topics(bag: Path, tmp_path: Path) -> None:
+    import subprocess
+    import sys
+
+    with rig.Listener(images=True) as heard:
+        moved = tmp_path / 'moved.mcap'
+        with rig.BagWriter(moved) as writer:  # kinect2_bridge's names
+            for made in rig.frames()[:5]:
+                writer.write_frame(made.frame)
+        subprocess.run(
+            [sys.executable, '-m', 'rgbd_kcf_tracker.ros.replay_main', '--ros-args',
+             '-p', f'bag:={moved}', '-r', '/kinect2/qhd/image_color_rect:=/color/image',
+             '-r', '/kinect2/qhd/image_depth_rect:=/depth/image'],
+            check=True, timeout=60,
+        )  # fmt: skip
+        time.sleep(0.2)
+    assert len(heard.colors) == len(heard.depths) == 5
+    assert heard.colors[0].header.frame_id == 'kinect2_rgb_optical_frame'
+
+
+def test_a_sequence_folder_is_replayed_like_a_bag(tmp_path: Path) -> None:
+    folder = tmp_path / 'sequence'
+    with SequenceWriter(folder) as writer:
+        for made in rig.frames()[:10]:
+            writer.write(made.frame, made.visible, made.body)
+    with (
+        rig.Listener() as heard,
+        rig.running_tracker(
+            tmp_path, variant='kcf', init_box=rig.box_text(rig.first_box()), queue_policy='all'
+        ),
+    ):
+        heard.await_tracker()
+        status, output = rig.run_replay(tmp_path, bag=str(folder), lockstep=True)
+        assert status == 0, output
+    assert '10 colour and 10 depth images; 10 of 10 answered' in output
+    assert [stamp_to_ns(m.header.stamp) for m in heard.boxes] == [
+        made.frame.stamp_ns for made in rig.frames()[:10]
+    ]
+
+
+def test_a_ros1_bag_is_replayed(shared_data: Path, tmp_path: Path) -> None:
+    path = sorted((shared_data / 'bags').rglob('*.bag'))[0]
+    with open_recording(path) as recording:
+        count = len(recording)
+        size = next(recording.frames()).color.shape
+    with rig.running_tracker(
+        tmp_path, queue_policy='all', variant='kcf', init_box='100,100,60,80'
+    ), rig.Listener() as heard:  # fmt: skip
+        status, output = rig.run_replay(tmp_path, bag=str(path), rate=0.0, wait_for_subscribers=0.5)
+    assert status == 0, output
+    assert f'{count} colour and {count} depth images' in output
+    assert size[2] == 3
+    assert heard.boxes == []  # the tracker listens to other names
+
+
+def test_lockstep_without_a_tracker_says_what_is_missing(bag: Path, tmp_path: Path) -> None:
+    status, output = rig.run_replay(tmp_path, bag=str(bag), lockstep=True, wait_for_subscribers=0.5)
+    assert status == 2
+    assert 'nobody subscribes to /color/image, /depth/image' in output
+    assert '/tracker/box' in output
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'words'),
+    [
+        ({}, 'set the parameter bag'),
+        ({'bag': 'no/such/file.mcap'}, 'no/such/file.mcap does not exist'),
+        ({'rate': -1.0}, 'parameter rate is -1.0'),
+        ({'rate': 'fast'}, 'parameter rate must be of type float'),
+        ({'speed': 1.0}, "unknown parameter 'speed'"),
+        ({'bag': 'BAG', 'topics': '/nothing'}, 'has no topic /nothing'),
+        ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 0.0}, 'ends before start'),
+    ],
+)
+def test_mistakes_are_named(
+    bag: Path, tmp_path: Path, parameters: dict[str, object], words: str
+) -> None:
+    given = {k: str(bag) if v == 'BAG' else v for k, v in parameters.items()}
+    status, output = rig.run_replay(tmp_path, **(given or {'rate': 1.0}))
+    assert status == 2
+    assert words in output
+
+
+def test_bad_bags(bag: Path, tmp_path: Path) -> None:
+    """Cut off, empty, no bag at all: what is whole goes out, the rest is said in words."""
+    whole = bag.read_bytes()
+    cut = tmp_path / 'cut.mcap'
+    cut.write_bytes(whole[: len(whole) * 6 // 10])
+    with rig.Listener(images=True) as heard:
+        status, output = rig.run_replay(tmp_path, bag=str(cut), rate=0.0)
+        time.sleep(0.2)
+    assert status == 0, output
+    assert 'cut off' in output
+    assert 20 < len(heard.colors) < len(rig.frames())
+    for name, content, words in (
+        ('empty.mcap', b'', 'is empty'),
+        ('text.mcap', b'no bag at all', 'is no recording'),
+        ('head.mcap', whole[:8], 'holds no messages'),
+    ):
+        path = tmp_path / name
+        path.write_bytes(content)
+        status, output = rig.run_replay(tmp_path, bag=str(path), wait_for_subscribers=0.0)
+        assert status == 2, output
+        assert words in output
+
+
+@pytest.mark.parametrize('compression', ['lz4', 'zstd'])
+def test_compressed_chunks(tmp_path: Path, compression: str) -> None:
+    path = rig.write_bag(tmp_path / 'packed.mcap', compression=compression)
+    with rig.Listener(images=True) as heard:
+        status, output = rig.run_replay(tmp_path, bag=str(path), rate=3.0)
+        time.sleep(0.2)
+    assert status == 0, output
+    assert [bytes(m.data) for m in heard.colors] == [
+        made.frame.color.tobytes() for made in rig.frames()
+    ]
