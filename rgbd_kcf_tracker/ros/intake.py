@@ -4,8 +4,8 @@
 """Receiving: messages in, captures out. Only stores, never decodes, so that it takes no time.
 
 Pairing itself is the recordings' (:class:`StampPairer`), so that live and recorded images are
-paired by one rule. What a live stream needs beyond it is here: stamps that say nothing (zero, or
-always the same) are replaced by the arrival, a colour image waits only so long for its depth, and
+paired by one rule. What a live stream needs beyond it is here: stamps that say nothing (always
+the same, mostly zero) are replaced by the arrival, a colour image waits only so long for its depth, and
 the first ones wait for the camera_info that comes with them.
 """
 
@@ -45,9 +45,6 @@ class StampRepair:
             if _same(data, self._data):
                 return None
             repaired = self._repaired + max(arrival_ns - self._arrival, 1)
-        elif stamp_ns == 0 and self._stamp is not None:
-            # The first may be 0 rightly: the stamps of a converted folder count from there.
-            repaired = arrival_ns
         self._stamp, self._data = stamp_ns, data
         self._repaired, self._arrival = repaired, arrival_ns
         return repaired
