@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import argparse
 import shutil
-import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
+from rgbd_kcf_tracker.cli.common import progress
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rgbd_kcf_tracker.simulation import SimulatedFrame, SimulatedSequence
+
+WriteFrame: TypeAlias = 'Callable[[SimulatedFrame], None]'
+WriterContext: TypeAlias = AbstractContextManager[WriteFrame]
 
 NAME = 'simulate'
 HELP = 'record simulated scenes with exact ground truth'
@@ -81,7 +82,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--overwrite', action='store_true', help='replace what is at DEST')
     parser.add_argument('--list', action='store_true', help='list the scenarios and stop')
-    parser.add_argument('--quiet', action='store_true', help='no progress bar')
+    parser.add_argument(
+        '--color-format',
+        choices=('png', 'jpg'),
+        default='png',
+        help='of the colour images of a folder (default: png; jpg takes a tenth of the space)',
+    )
+    parser.add_argument(
+        '--compression',
+        choices=('none', 'lz4', 'zstd'),
+        default='none',
+        help='of the chunks of an mcap file (default: none)',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -97,31 +109,36 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError('DEST is missing: name an .mcap file or a folder to write (or --list)')
     if args.count < 1:
         raise ParameterError(f'--count is {args.count}: give 1 or more')
-    names: list[str] = args.scenario or ['normal']
+    names = list(dict.fromkeys(args.scenario or ['normal']))
     if 'all' in names:
         names = list(SCENARIOS)
     size = _parse_size(args.size)
     for name in names:  # find every mistake before anything is written
         check_request(name, args.seed, args.rate, args.duration, size)
-    seeds = range(args.seed, args.seed + args.count)
-    if len(names) * len(seeds) == 1:
-        if args.format == 'mcap' and args.dest.suffix != '.mcap':
-            raise ParameterError(f'--format mcap, but {args.dest} does not end in .mcap')
-        _prepare(args.dest, args.overwrite)
-        sequence = simulate(names[0], args.seed, args.rate, args.duration, size)
-        _record(sequence, args.dest, args.quiet)
-        return 0
-    if args.dest.suffix == '.mcap':
-        raise ParameterError(
-            f'{args.dest} is one file for {len(names) * len(seeds)} scenes: name a folder'
-        )
-    suffix = '.mcap' if args.format == 'mcap' else ''
-    for name in names:
-        for seed in seeds:
-            dest = args.dest / f'{name}_{seed}{suffix}'
-            _prepare(dest, args.overwrite)
-            _record(simulate(name, seed, args.rate, args.duration, size), dest, args.quiet)
+    jobs = [(name, seed) for name in names for seed in range(args.seed, args.seed + args.count)]
+    for dest, (name, seed) in zip(_destinations(args, jobs), jobs, strict=True):
+        _prepare(dest, args.overwrite)
+        sequence = simulate(name, seed, args.rate, args.duration, size)
+        if dest.suffix == '.mcap':
+            _record(sequence, dest, lambda path: _bag(path, size, args.compression))
+        else:
+            _record(sequence, dest, lambda path: _folder(path, args.color_format))
     return 0
+
+
+def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list[Path]:
+    """Where each scene goes."""
+    dest: Path = args.dest
+    if len(jobs) == 1:
+        if args.format == 'mcap' and dest.suffix != '.mcap':
+            raise ParameterError(f'--format mcap, but {dest} does not end in .mcap')
+        if args.format == 'folder' and dest.suffix == '.mcap':
+            raise ParameterError(f'--format folder, but {dest} ends in .mcap')
+        return [dest]
+    if dest.suffix == '.mcap':
+        raise ParameterError(f'{dest} is one file for {len(jobs)} scenes: name a folder')
+    suffix = '.mcap' if args.format == 'mcap' else ''
+    return [dest / f'{name}_{seed}{suffix}' for name, seed in jobs]
 
 
 def _parse_size(text: str) -> tuple[int, int]:
@@ -148,41 +165,29 @@ def _prepare(dest: Path, overwrite: bool) -> None:
         raise RecordingError(f'cannot create {dest.parent}: {error.strerror}') from error
 
 
-def _record(sequence: SimulatedSequence, dest: Path, quiet: bool) -> None:
+def _record(
+    sequence: SimulatedSequence, dest: Path, open_writer: Callable[[Path], WriterContext]
+) -> None:
     """Render a sequence and write it, frame by frame."""
-    from tqdm import tqdm
-
-    title = f'{sequence.scenario} (seed {sequence.seed})'
-    bar = tqdm(
-        sequence,
-        total=len(sequence),
-        desc=title,
-        unit='frame',
-        disable=quiet,
-        file=sys.stderr,
-        mininterval=0.5,
-    )
-    frames: Iterable[SimulatedFrame] = bar
+    title = f'{sequence.scenario}, seed {sequence.seed}'
     hidden = 0
-    with _writer(dest) as write:
-        for simulated in frames:
+    with open_writer(dest) as write:
+        for simulated in progress(sequence, len(sequence), title):
             write(simulated)
             hidden += simulated.visible is None
     print(
-        f'{dest}: {title}, {len(sequence)} frames at {sequence.rate_hz:g} Hz, '
-        f'target hidden in {hidden}'
+        f'{dest}: {title}: {len(sequence)} frames at {sequence.rate_hz:g} Hz, '
+        f'the target hidden in {hidden}',
+        flush=True,
     )
 
 
-def _writer(dest: Path) -> AbstractContextManager[Callable[[SimulatedFrame], None]]:
-    return _bag(dest) if dest.suffix == '.mcap' else _folder(dest)
-
-
 @contextmanager
-def _bag(dest: Path) -> Iterator[Callable[[SimulatedFrame], None]]:
-    from rgbd_kcf_tracker.recordings import BagWriter
+def _bag(dest: Path, size: tuple[int, int], compression: str) -> Iterator[WriteFrame]:
+    from rgbd_kcf_tracker.recordings import KINECT2_HD, KINECT2_QHD, KINECT2_SD, BagWriter
 
-    with BagWriter(dest) as bag:
+    topics = {(1920, 1080): KINECT2_HD, (512, 424): KINECT2_SD}.get(size, KINECT2_QHD)
+    with BagWriter(dest, topics, compression=compression) as bag:
 
         def write(simulated: SimulatedFrame) -> None:
             bag.write_frame(simulated.frame)
@@ -192,12 +197,14 @@ def _bag(dest: Path) -> Iterator[Callable[[SimulatedFrame], None]]:
 
 
 @contextmanager
-def _folder(dest: Path) -> Iterator[Callable[[SimulatedFrame], None]]:
+def _folder(dest: Path, color_format: str) -> Iterator[WriteFrame]:
     from rgbd_kcf_tracker.recordings import SequenceWriter
 
-    with SequenceWriter(dest) as folder:
+    with SequenceWriter(dest, color_format) as folder:
 
         def write(simulated: SimulatedFrame) -> None:
-            folder.write(simulated.frame, simulated.visible, simulated.body)
+            folder.write(
+                simulated.frame, simulated.visible, simulated.body, simulated.visible_fraction
+            )
 
         yield write

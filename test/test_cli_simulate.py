@@ -1,0 +1,118 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``rgbd-kcf simulate``: what it writes can be read, and is what was simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
+from rgbd_kcf_tracker.simulation import SCENARIOS, simulate
+
+SMALL = ['--size', '160x90', '--rate', '2']
+
+
+def run(*words: object) -> int:
+    return main(['simulate', *map(str, words)])
+
+
+@pytest.mark.parametrize('name', ['walk.mcap', 'walk'])
+def test_what_is_written_is_what_was_simulated(tmp_path: Path, name: str) -> None:
+    dest = tmp_path / 'made' / name
+    assert run(dest, '--scenario', 'behind_box', '--seed', 3, *SMALL) == 0
+    expected = list(simulate('behind_box', 3, 2.0, size=(160, 90)))
+    with open_recording(dest, ReadOptions()) as recording:
+        frames = list(recording.frames())
+        visible, body = recording.groundtruth, recording.groundtruth_body
+    assert len(frames) == len(expected)
+    assert visible is not None
+    assert body is not None
+    for frame, box, whole, simulated in zip(frames, visible, body, expected, strict=True):
+        assert np.array_equal(frame.color, simulated.frame.color)
+        assert frame.stamp_ns == simulated.frame.stamp_ns
+        assert frame.intrinsics == simulated.frame.intrinsics
+        assert frame.depth is not None
+        assert simulated.frame.depth is not None
+        assert np.allclose(frame.depth, simulated.frame.depth, atol=6e-4, equal_nan=True)
+        assert_same_box(box, simulated.visible)
+        assert_same_box(whole, simulated.body)
+    assert any(box is None for box in visible)
+
+
+def assert_same_box(a: Box | None, b: Box | None) -> None:
+    if a is None or b is None:
+        assert a is b
+    else:
+        assert np.allclose(a.as_tuple(), b.as_tuple(), atol=0.01)
+
+
+def test_kinect2_topics(tmp_path: Path) -> None:
+    from rosbags.highlevel import AnyReader
+
+    run(tmp_path / 'a.mcap', '--duration', 1, *SMALL)
+    with AnyReader([tmp_path / 'a.mcap']) as reader:
+        topics = set(reader.topics)
+    assert {'/kinect2/qhd/image_color_rect', '/kinect2/qhd/image_depth_rect'} <= topics
+    assert {'/kinect2/qhd/camera_info', '/groundtruth/visible', '/groundtruth/body'} <= topics
+
+
+def test_several_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenes = ['--scenario', 'normal', '--scenario', 'no_depth', '--count', 2, '--seed', 5]
+    assert run(tmp_path / 's', *scenes, '--duration', 1, *SMALL) == 0
+    names = sorted(path.name for path in (tmp_path / 's').iterdir())
+    assert names == ['no_depth_5', 'no_depth_6', 'normal_5', 'normal_6']
+    assert not (tmp_path / 's' / 'no_depth_5' / 'depth').exists()
+    assert capsys.readouterr().out.count('2 frames at 2 Hz') == 4
+
+
+def test_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run('--list') == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(SCENARIOS)
+    assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_nothing_is_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    short = ['--duration', 1, *SMALL]
+    for dest in (tmp_path / 'a.mcap', tmp_path / 'a'):
+        assert run(dest, *short) == 0
+        assert run(dest, *short) == 2
+        assert '--overwrite' in capsys.readouterr().err
+        assert run(dest, *short, '--overwrite', '--scenario', 'no_depth') == 0
+        with open_recording(dest, ReadOptions(depth_topic='none')) as recording:
+            assert all(frame.depth is None for frame in recording.frames())
+    other = tmp_path / 'mine'
+    other.mkdir()
+    (other / 'thesis.txt').write_text('years of work')
+    assert run(other, *short, '--overwrite') == 2
+    assert (other / 'thesis.txt').exists()
+
+
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        (['x.mcap', '--scenario', 'ocean'], 'unknown scenario'),
+        (['x.mcap', '--rate', '0'], 'rate'),
+        (['x.mcap', '--size', 'big'], '--size'),
+        (['x.mcap', '--size', '0x0'], 'size'),
+        (['x.mcap', '--duration', '-1'], 'duration'),
+        (['x.mcap', '--count', '0'], '--count'),
+        (['x.mcap', '--count', '2'], 'name a folder'),
+        (['x', '--format', 'mcap'], '.mcap'),
+        ([], 'DEST'),
+    ],
+)
+def test_mistakes_are_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    words: list[str], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    assert run(*words) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
