@@ -4,8 +4,8 @@
 """Receiving: messages in, captures out. Only stores, never decodes, so that it takes no time.
 
 Pairing itself is the recordings' (:class:`StampPairer`), so that live and recorded images are
-paired by one rule. What a live stream needs beyond it is here: stamps that say nothing (always
-the same, mostly zero) are replaced by the arrival, a colour image waits only so long for its depth, and
+paired by one rule. What a live stream needs beyond it is here: stamps that say nothing (always the
+same, mostly zero) are replaced by the arrival, a colour image waits only so long for its depth, and
 the first ones wait for the camera_info that comes with them.
 """
 

@@ -73,6 +73,23 @@ class TrackerNode(LifecycleNode):
         self._poll_timer = self.create_timer(POLL_PERIOD_S, self._poll)
         self._poll_timer.cancel()
 
+        self._answer_impossible_transitions()
+
+    def _answer_impossible_transitions(self) -> None:
+        """Refuse a transition that does not fit the state; rclpy raises and leaves no answer."""
+        service = self._service_change_state
+        change = service.callback
+
+        def guarded(request: Any, response: Any) -> Any:
+            try:
+                return change(request, response)
+            except Exception as error:  # RCLError, which rclpy does not export
+                self.get_logger().warning(f'transition {request.transition.id} refused: {error}')
+                response.success = False
+                return response
+
+        service.callback = guarded
+
     @property
     def settings(self) -> NodeParameters:
         """The node's own parameters as they stand."""

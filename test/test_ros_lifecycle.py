@@ -1,0 +1,237 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The managed node: its states, its parameters while running, its files of parameters."""
+
+from __future__ import annotations
+
+import gc
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+import rclpy
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from ros_rig import Rig, overrides, running_node, scene, tracker_process
+
+from rgbd_kcf_tracker.ros.bench_rig import resident_mb
+from rgbd_kcf_tracker.ros.generated import outdated
+from rgbd_kcf_tracker.ros.settings import READ_ONLY, all_parameters
+from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
+
+pytestmark = pytest.mark.ros
+
+PROJECT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    made = Rig()
+    yield made
+    made.close()
+
+
+def call(rig: Rig, kind: Any, name: str, request: Any) -> Any:
+    client = rig.node.create_client(kind, name)
+    assert client.wait_for_service(5)
+    answer = client.call_async(request)
+    rig.wait(answer.done, what=name)
+    return answer.result()
+
+
+def change(rig: Rig, transition: int) -> bool:
+    request = ChangeState.Request()
+    request.transition.id = transition
+    return bool(call(rig, ChangeState, '/tracker/change_state', request).success)
+
+
+def state(rig: Rig) -> int:
+    return int(call(rig, GetState, '/tracker/get_state', GetState.Request()).current_state.id)
+
+
+def set_parameter(rig: Rig, name: str, value: Any) -> Any:
+    parameter = Parameter(name, value=value).to_parameter_msg()
+    request = SetParameters.Request(parameters=[parameter])
+    return call(rig, SetParameters, '/tracker/set_parameters', request).results[0]
+
+
+def box_text(index: int) -> str:
+    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
+
+
+def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:
+    with running_node(rig, autostart=False, queue_policy='all', init_box=box_text(0)) as node:
+        assert state(rig) == State.PRIMARY_STATE_UNCONFIGURED
+        assert node.count_subscribers('/color/image') == 0
+        assert change(rig, Transition.TRANSITION_CONFIGURE)
+        assert state(rig) == State.PRIMARY_STATE_INACTIVE
+        assert node.count_subscribers('/color/image') == 0
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        rig.await_listener()
+        rig.play(range(5))
+        assert rig.box().iou(scene(4)[2]) > 0.6
+        # The target outlives a pause.
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        rig.send(5)
+        time.sleep(0.2)
+        assert len(rig.boxes) == 5
+        assert rig.fresh_values()['message'] == 'inactive'
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        rig.await_listener()
+        rig.play(range(6, 9))
+        assert rig.box().iou(scene(8)[2]) > 0.6
+        # Cleaned up and configured again, it starts from its parameters.
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert change(rig, Transition.TRANSITION_CLEANUP)
+        assert state(rig) == State.PRIMARY_STATE_UNCONFIGURED
+        assert set_parameter(rig, 'init_box', box_text(20)).successful
+        assert change(rig, Transition.TRANSITION_CONFIGURE)
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        rig.await_listener()
+        rig.play(range(20, 23))
+        assert rig.box().iou(scene(22)[2]) > 0.6
+        assert change(rig, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+        assert state(rig) == State.PRIMARY_STATE_FINALIZED
+
+
+def test_a_request_that_does_not_fit_the_state_is_refused_and_survived(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all'):
+        assert not change(rig, Transition.TRANSITION_CONFIGURE)
+        assert not change(rig, 250)
+        rig.play(range(2))
+        assert state(rig) == State.PRIMARY_STATE_ACTIVE
+
+
+def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
+    """Memory, threads and topics are what they were, and it still works."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    node = TrackerNode(context=context, parameter_overrides=overrides({'autostart': False}))
+
+    def cycle() -> None:
+        for step in (
+            node.trigger_configure,
+            node.trigger_activate,
+            node.trigger_deactivate,
+            node.trigger_cleanup,
+        ):
+            assert step().name == 'SUCCESS'
+
+    def counted() -> tuple[int, ...]:
+        return (
+            len(list(node.publishers)),
+            len(list(node.subscriptions)),
+            len(list(node.services)),
+            len(list(node.timers)),
+            threading.active_count(),
+            len(os.listdir('/proc/self/fd')),
+        )
+
+    for _ in range(100):
+        cycle()
+    gc.collect()
+    before, memory = counted(), resident_mb(os.getpid())
+    for _ in range(900):
+        cycle()
+    gc.collect()
+    assert counted() == before
+    assert resident_mb(os.getpid()) - memory < 20
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def test_parameters_are_described(rig: Rig) -> None:
+    with running_node(rig):
+        names = [info.name for info in all_parameters()]
+        request = DescribeParameters.Request(names=names)
+        answer = call(rig, DescribeParameters, '/tracker/describe_parameters', request)
+        for info, described in zip(all_parameters(), answer.descriptors, strict=True):
+            assert described.description.startswith(info.description)
+            assert described.read_only == (info.name in READ_ONLY)
+            if info.type is float and info.minimum is not None:
+                assert described.floating_point_range[0].from_value == info.minimum
+            if info.choices:
+                assert all(choice in described.additional_constraints for choice in info.choices)
+
+
+def test_parameters_while_running(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
+        rig.play(range(3))
+        refused = set_parameter(rig, 'kcf.padding', 1e6)
+        assert not refused.successful
+        assert 'padding' in refused.reason
+        assert not set_parameter(rig, 'variant', 'magic').successful
+        assert 'choose one of' in set_parameter(rig, 'variant', 'magic').reason
+        assert not set_parameter(rig, 'queue_policy', 'newest').successful
+        assert not set_parameter(rig, 'kcf.padding', 'wide').successful
+        assert not set_parameter(rig, 'init_box', '1,2,3').successful
+        # An integer is taken for a double, and it reaches the tracker.
+        assert set_parameter(rig, 'kcf.padding', 2).successful
+        assert node.get_parameter('kcf.padding').value == 2.0
+        rig.play(range(3, 6))
+        assert rig.box().iou(scene(5)[2]) > 0.6
+        assert set_parameter(rig, 'init_box', [float(v) for v in scene(6)[2].as_tuple()]).successful
+        rig.play([6])
+        assert rig.box().as_tuple() == scene(6)[2].as_tuple()
+
+
+def test_bad_overrides_leave_defaults_and_a_message(rig: Rig) -> None:
+    """Each of these crashes a plain rclpy node."""
+    arguments = []
+    for override in (
+        'kcf.padding:=2',
+        'kcf.learning_rate:=7.5',
+        'pair_tolerance:="soon"',
+        'variant:=3',
+        'init_box:=[1,2,3]',
+        'kcf.padding_:=1.0',
+    ):
+        arguments += ['-p', override]
+    with tracker_process(*arguments) as process:
+        rig.await_listener()
+        rig.play(range(2))
+        values = rig.fresh_values()
+        process.terminate()
+        assert process.wait(5) == 0
+        output = process.stdout.read()
+    assert values['bad_parameters'] == '5'
+    assert 'parameter learning_rate is 7.5: it must be between 0 and 1' in output.replace(
+        'kcf.', ''
+    )
+    assert "unknown parameter 'kcf.padding_' is ignored" in output
+    assert 'Traceback' not in output
+
+
+def test_generated_files_are_up_to_date() -> None:
+    assert outdated(PROJECT) == [], 'run python -m rgbd_kcf_tracker.ros.generated'
+
+
+def test_shipped_file_of_parameters_is_taken(rig: Rig, tmp_path: Path) -> None:
+    text = (PROJECT / 'config' / 'tracker.yaml').read_text(encoding='utf-8')
+    assert 'stale_after: 2.0' in text
+    changed = tmp_path / 'tracker.yaml'
+    changed.write_text(text.replace('stale_after: 2.0', 'stale_after: 1.25'), encoding='utf-8')
+    with tracker_process(
+        *('--params-file', str(changed), '-r', '__ns:=/left', '-r', '__node:=watcher')
+    ):
+        request = DescribeParameters.Request(names=['stale_after'])
+        call(rig, DescribeParameters, '/left/watcher/describe_parameters', request)
+        rig.wait(lambda: any(d.name == '/left/watcher: tracker' for d in rig.diagnostics))
+        assert 'bad_parameters' not in rig.values()
+        answer = call(
+            rig,
+            GetParameters,
+            '/left/watcher/get_parameters',
+            GetParameters.Request(names=['stale_after']),
+        )
+        assert answer.values[0].double_value == 1.25

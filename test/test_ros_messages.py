@@ -1,0 +1,265 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Between messages and our types, for any input that the wire can carry."""
+
+from __future__ import annotations
+
+import array
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker
+
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
+from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_from_info
+from rgbd_kcf_tracker.ros.annotate import annotated
+from rgbd_kcf_tracker.ros.messages import (
+    box_from_roi,
+    detections_from_track,
+    image_message,
+    marker_from_track,
+    polygon_from_box,
+    position_from_track,
+    roi_from_box,
+    stamp_from_ns,
+    stamp_to_ns,
+)
+from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
+from rgbd_kcf_tracker.ros.session import Session
+from rgbd_kcf_tracker.ros.statistics import Statistics
+from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, default_parameters
+
+many = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+uint32 = st.integers(0, 2**32 - 1)
+pixel = st.floats(-5000, 5000, width=32)
+side = st.floats(0.5, 5000, width=32)
+boxes = st.builds(Box, pixel, pixel, side, side)
+HEADER = Header(stamp=stamp_from_ns(1_700_000_000_123_456_789), frame_id='camera')
+
+
+def wire(message: Any) -> Any:
+    """The message after a way over the wire; a wrong type or range fails here."""
+    return deserialize_message(serialize_message(message), type(message))
+
+
+@many
+@given(st.integers(0, (2**31 - 1) * 10**9))
+def test_stamps_there_and_back(stamp_ns: int) -> None:
+    assert stamp_to_ns(stamp_from_ns(stamp_ns)) == stamp_ns
+
+
+@many
+@given(uint32, uint32, uint32, uint32)
+def test_any_region_is_a_box_or_refused(x: int, y: int, width: int, height: int) -> None:
+    roi = RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height)
+    if width and height:
+        assert box_from_roi(roi).as_tuple() == (x, y, width, height)
+    else:
+        with pytest.raises(RgbdKcfError, match='no size'):
+            box_from_roi(roi)
+
+
+@many
+@given(boxes, st.integers(1, 4000), st.integers(1, 4000))
+def test_any_box_is_a_region_inside_the_image_or_none(box: Box, width: int, height: int) -> None:
+    roi = roi_from_box(box, width, height)
+    inside = box.clipped(width, height)
+    if inside is None:
+        assert roi is None
+        return
+    roi = wire(roi)
+    assert 1 <= roi.width <= width - roi.x_offset
+    assert 1 <= roi.height <= height - roi.y_offset
+    assert roi.x_offset <= inside.x
+    assert roi.x_offset + roi.width >= inside.right
+
+
+@many
+@given(boxes)
+def test_a_polygon_is_the_box_again(box: Box) -> None:
+    message = wire(polygon_from_box(HEADER, box))
+    assert message.header == HEADER
+    assert len(message.polygon.points) == 4
+    again = box_from_polygon(message.polygon.points)
+    assert np.allclose(again.as_tuple(), box.as_tuple(), atol=2e-3)
+    assert wire(polygon_from_box(HEADER, None)).polygon.points == []
+
+
+@many
+@given(
+    boxes,
+    st.one_of(st.none(), st.tuples(*[st.floats() for _ in range(3)])),
+    st.floats(0, 1),
+    st.floats(0, 10),
+)
+def test_positions_and_markers_fit_the_wire(
+    box: Box, position: tuple[float, float, float] | None, score: float, lifetime: float
+) -> None:
+    track = Track(box, TrackState.TRACKING, score, None, position)
+    point = position_from_track(HEADER, track)
+    finite = position is not None and bool(np.all(np.isfinite(position)))
+    assert (point is not None) == finite
+    camera = Intrinsics(500, 500, 160, 120)
+    marker = wire(marker_from_track(HEADER, track, camera, lifetime))
+    assert marker.action == (Marker.ADD if finite else Marker.DELETE)
+    assert marker.header == HEADER
+
+
+@pytest.mark.parametrize('shape', [(7, 5, 3), (7, 5), (1, 1, 3)])
+def test_images_there_and_back(shape: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(1)
+    if len(shape) == 3:
+        image = rng.integers(0, 255, shape, np.uint8)
+        assert np.array_equal(decode_color(wire(image_message(HEADER, image, 'bgr8'))), image)
+        flipped = image[:, ::-1]
+        assert np.array_equal(decode_color(image_message(HEADER, flipped, 'bgr8')), flipped)
+    else:
+        depth = rng.integers(1, 9000, shape, np.uint16)
+        metres = decode_depth(wire(image_message(HEADER, depth, '16UC1')))
+        assert np.allclose(metres, depth / 1000)
+
+
+def vision_types() -> SimpleNamespace:
+    """The messages of vision_msgs 4 (Jazzy) in plain Python: it is not on the package index."""
+
+    def fields(**defaults: Any) -> type:
+        def init(self: Any, **values: Any) -> None:
+            for name, make in defaults.items():
+                setattr(self, name, values.pop(name) if name in values else make())
+            assert not values, values
+
+        return type('Message', (), {'__init__': init, '__slots__': tuple(defaults)})
+
+    point2 = fields(x=float, y=float)
+    pose2 = fields(position=point2, theta=float)
+    bbox = fields(center=pose2, size_x=float, size_y=float)
+    hypothesis = fields(class_id=str, score=float)
+    point3 = fields(x=float, y=float, z=float)
+    pose = fields(pose=fields(position=point3))
+    with_pose = fields(hypothesis=hypothesis, pose=pose)
+    return SimpleNamespace(
+        Detection2DArray=fields(header=Header, detections=list),
+        Detection2D=fields(header=Header, results=list, bbox=bbox, id=str),
+        ObjectHypothesisWithPose=with_pose,
+    )
+
+
+def test_detections() -> None:
+    types = vision_types()
+    track = Track(Box(10, 20, 30, 40), TrackState.TRACKING, 0.7, 2.0, (0.1, 0.2, 2.0))
+    message = detections_from_track(types, HEADER, track, 'target')
+    (detection,) = message.detections
+    center = detection.bbox.center.position
+    assert (center.x, center.y, detection.bbox.size_x, detection.bbox.size_y) == (25, 40, 30, 40)
+    assert detection.results[0].hypothesis.score == 0.7
+    assert detection.results[0].pose.pose.position.z == 2.0
+    assert message.header == detection.header == HEADER
+    gone = Track(None, TrackState.OCCLUDED)
+    assert detections_from_track(types, HEADER, gone, 'target').detections == []
+
+
+@pytest.mark.parametrize('state', list(TrackState))
+def test_annotated_is_a_copy_with_something_on_it(state: TrackState) -> None:
+    image = np.full((120, 160, 3), 90, np.uint8)
+    box = Box(-20, 10, 60, 200) if state is TrackState.TRACKING else None
+    out = annotated(image, Track(box, state, 0.5, 1.5))
+    assert (image == 90).all()
+    assert (out != 90).any()
+    assert out.shape == image.shape
+
+
+def processor(faults: list[str]) -> Processor:
+    session = Session(DEFAULT_VARIANT, default_parameters(DEFAULT_VARIANT), faults.append)
+    session.choose(lambda _: None)
+    silent = SimpleNamespace(
+        image_wanted=False, publish=lambda *_: None, publish_extras=lambda *_: None
+    )
+    return Processor(session, silent, Statistics(), lambda: 0, lambda _, text: faults.append(text))
+
+
+encodings = st.sampled_from(
+    ['bgr8', 'rgb8', 'mono8', 'bgra8', '16UC1', '32FC1', '', 'jpeg', '8UC3']
+)
+raw_images = st.builds(
+    lambda encoding, height, width, step, big, data: Image(
+        header=HEADER,
+        encoding=encoding,
+        height=height,
+        width=width,
+        step=step,
+        is_bigendian=big,
+        data=array.array('B', data),
+    ),
+    encodings,
+    st.one_of(st.integers(0, 12), uint32),
+    st.one_of(st.integers(0, 12), uint32),
+    st.one_of(st.integers(0, 48), uint32),
+    st.integers(0, 255),
+    st.binary(max_size=600),
+)
+packed_images = st.builds(
+    lambda text, data: CompressedImage(header=HEADER, format=text, data=array.array('B', data)),
+    st.one_of(
+        st.sampled_from(['16UC1; compressedDepth png', '32FC1; compressedDepth rvl', 'jpeg']),
+        st.text(max_size=20),
+    ),
+    st.one_of(
+        st.binary(max_size=300),
+        st.binary(max_size=200).map(lambda b: b'\x89PNG\r\n\x1a\n' + b),
+        st.binary(max_size=200).map(lambda b: bytes(12) + b'\x89PNG\r\n\x1a\n' + b),
+        st.binary(max_size=200).map(lambda b: b'\xff\xd8\xff' + b),
+    ),
+)
+
+
+@many
+@given(raw_images, st.one_of(st.none(), raw_images))
+def test_any_pair_of_images_is_a_frame_or_a_fault(color: Image, depth: Image | None) -> None:
+    faults: list[str] = []
+    made = processor(faults)
+    frame = made.frame(Capture(color, depth, Camera(Intrinsics(1, 1, 0, 0), 0, 0), 0), 0)
+    assert isinstance(frame, Frame) or faults
+    made(Capture(color, depth, None, 0))
+
+
+@many
+@given(packed_images, packed_images)
+def test_any_pair_of_compressed_images_is_a_frame_or_a_fault(
+    color: CompressedImage, depth: CompressedImage
+) -> None:
+    faults: list[str] = []
+    session = Session(DEFAULT_VARIANT, default_parameters(DEFAULT_VARIANT), faults.append)
+    session.choose(lambda _: None)
+    made = Processor(
+        session,
+        SimpleNamespace(image_wanted=True, publish=print, publish_extras=print),
+        Statistics(),
+        lambda: 0,
+        lambda _, text: faults.append(text),
+        color_transport='compressed',
+        depth_transport='compressedDepth',
+    )
+    assert isinstance(made.frame(Capture(color, depth, None, 0), 0), Frame) or faults
+
+
+@many
+@given(st.lists(st.floats(width=64), min_size=9, max_size=9), st.integers(0, 2**32 - 1))
+def test_any_camera_info_is_a_camera_or_refused(values: list[float], width: int) -> None:
+    info = wire(CameraInfo(header=HEADER, width=width, k=values))
+    try:
+        camera = intrinsics_from_info(info)
+    except RgbdKcfError:
+        return
+    assert camera is None or (camera.fx > 0 and camera.fy > 0)
