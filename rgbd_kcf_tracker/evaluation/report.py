@@ -85,12 +85,11 @@ def write_report(
     write_json(folder / 'report.json', numbers, indent=1)
 
     palette = plots.colors(measured.trackers)
-    main = main_tracker(measured.trackers, heading.ablated)
+    main = main_tracker(measured.trackers, contenders, heading.ablated)
     content |= {
         'curves': page.uri(plots.curve_plots(measured, curves)),
         'scenario_plot': page.uri(plots.scenario_plot(measured, main)),
         'long_term_plot': page.uri(plots.long_term_plot(long_curves)),
-        'reliability_plot': page.uri(plots.reliability_plot(reliabilities)),
         'strips': page.strip_figures(folder, measured, main, palette),
         'sequence_plots': page.sequence_figures(measured, palette),
         'failures': failures,
@@ -101,15 +100,24 @@ def write_report(
         'options': heading.options,
         'command': heading.command,
     }
+    if reliabilities:
+        content['reliability_plot'] = page.uri(plots.reliability_plot(reliabilities))
     if collected.short_term:
         content['eao_plot'] = page.uri(plots.expected_overlap_plot(collected.short_term))
     write_atomically(folder / PAGE, page.render(measured, content))
     return measured
 
 
-def main_tracker(trackers: Sequence[str], ablated: Sequence[str] = ()) -> str:
-    """The tracker whose best and worst sequences are shown: the ablated, metric, or the last."""
-    return next((name for name in (*ablated, 'metric') if name in trackers), trackers[-1])
+def main_tracker(
+    measured: Sequence[str], contenders: Sequence[Contender], ablated: Sequence[str] = ()
+) -> str:
+    """The tracker whose best and worst sequences are shown.
+
+    The one ablated, else ``metric``, else the last of our variants, else the last of all.
+    """
+    ours = [c.name for c in contenders if c.kind == 'variant']
+    wanted = (*ablated, 'metric', *reversed(ours))
+    return next((name for name in wanted if name in measured), measured[-1])
 
 
 def _all_tables(content: Mapping[str, Any]) -> list[Table]:

@@ -211,22 +211,20 @@ def long_term(measured: Measured) -> tuple[Table, dict[str, longterm.LongTerm]]:
 
 def reliability(measured: Measured) -> tuple[Table, dict[str, calibration.Reliability]]:
     """Whether scores mean what they say: per tenth of score, the share of boxes that are right."""
-    tables, rows = {}, []
+    tables: dict[str, calibration.Reliability] = {}
+    rows: list[tuple[Cell, ...]] = []
     for tracker in measured.trackers:
         own = [r.counted for r in measured.results if r.tracker == tracker]
         scores = np.concatenate([c.score[c.said] for c in own])
         hits = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= HIT_IOU for c in own])
+        if not len(scores) or np.ptp(scores) == 0:
+            rows.append((tracker, len(scores), *[None] * (2 + calibration.BINS)))
+            continue
         tables[tracker] = table = calibration.reliability(scores, hits)
-        rows.append(
-            (
-                tracker,
-                int(table.counts.sum()),
-                scaled(table.expected_error, 100),
-                table.brier,
-                *(scaled(v, 100) for v in table.hit_rate),
-            )
-        )
-    edges = next(iter(tables.values())).edges if tables else np.linspace(0, 1, 11)
+        rates = (scaled(v, 100) for v in table.hit_rate)
+        error = scaled(table.expected_error, 100)
+        rows.append((tracker, int(table.counts.sum()), error, table.brier, *rates))
+    edges = np.linspace(0.0, 1.0, calibration.BINS + 1)
     bins = [f'{a:.1f}-{b:.1f}' for a, b in pairwise(edges)]
     return Table(
         'reliability',
@@ -234,7 +232,8 @@ def reliability(measured: Measured) -> tuple[Table, dict[str, calibration.Reliab
         ('tracker', 'boxes', 'calibration error %', 'Brier', *bins),
         tuple(rows),
         digits=2,
-        note=f'A box is right where its IoU with the visible target is at least {HIT_IOU}.',
+        note=f'A box is right where its IoU with the visible target is at least {HIT_IOU}. '
+        'Trackers that publish no score have no row of numbers.',
     ), tables
 
 

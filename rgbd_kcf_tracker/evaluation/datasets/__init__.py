@@ -9,11 +9,12 @@ One module per format; :func:`open_dataset` finds out which it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets import folder, otb, princeton, recorded, simulated, vot
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, folders
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, entries
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
@@ -101,11 +102,24 @@ def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
     here = _sequences_at(path, options)
     if here or depth == 0 or not path.is_dir():
         return here
-    bags = [p for p in path.iterdir() if p.is_file() and recorded.is_sequence(p)]
     found = []
-    for child in sorted([*folders(path), *bags], key=lambda p: natural_key(p.name)):
-        found.extend(_walk(child, options, depth - 1))
+    for child in sorted(entries(path), key=lambda p: natural_key(p.name)):
+        try:
+            found.extend(_walk(child, options, depth - 1))
+        except (OSError, DatasetError) as error:
+            found.append(_broken(child, str(error)))
     return found
+
+
+def _broken(path: Path, reason: str) -> Sequence:
+    """A folder that cannot be read fails when it is run, and ends no other."""
+    return Sequence(
+        path.name, path.parent.name, 'broken', partial(_fail, reason), reason, path=path
+    )
+
+
+def _fail(reason: str) -> Opened:
+    raise DatasetError(reason)
 
 
 def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:

@@ -80,7 +80,7 @@ class Sequence:
     name: str
     scenario: str
     kind: str
-    open: Callable[[], Opened]
+    open: Callable[[], Opened] = field(compare=False)
     identity: str
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
@@ -134,14 +134,14 @@ def file_token(*paths: Path) -> str:
     return '|'.join(parts)
 
 
-def folders(path: Path) -> list[Path]:
-    """The folders in a folder, sorted by name, hidden ones left out.
+def entries(path: Path) -> list[Path]:
+    """What is in a folder, hidden things left out.
 
     Raises:
         DatasetError: where it cannot be read.
     """
     try:
-        return sorted(p for p in path.iterdir() if p.is_dir() and not p.name.startswith('.'))
+        return [p for p in path.iterdir() if not p.name.startswith('.')]
     except OSError as error:
         raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
 

@@ -118,7 +118,7 @@ def _frames(path: Path) -> tuple[ImageFrames, Path]:
     file = _mat(path)
     try:
         content = loadmat(file, squeeze_me=True, struct_as_record=False)
-    except (OSError, ValueError, NotImplementedError, TypeError) as error:
+    except Exception as error:  # SciPy raises many kinds on a file that is damaged
         raise DatasetError(f'{file} cannot be read: {error}') from None
     info: Any = next((v for k, v in content.items() if not k.startswith('__')), None)
     try:
