@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -75,7 +77,7 @@ def _bar(
         image, (pad + text_height // 2, height // 2), text_height // 2, color, -1, cv2.LINE_AA
     )
     words = track.state.value
-    if track.box is not None:
+    if track.box is not None and not math.isnan(track.score):  # NaN: nobody said it
         words += f'   score {track.score:.2f}'
     if track.depth is not None:
         words += f'   {track.depth:.2f} m'

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from pathlib import Path
@@ -44,7 +45,7 @@ class TrackCsvWriter:
         cells = [str(number), str(stamp_ns), '', '', '', '', track.state.value, '', '']
         if track.box is not None:
             cells[2:6] = (f'{value:.4f}' for value in track.box.as_tuple())
-            cells[7] = f'{track.score:.4f}'
+            cells[7] = '' if math.isnan(track.score) else f'{track.score:.4f}'
             cells[8] = '' if track.depth is None else f'{track.depth:.4f}'
         self._write(','.join(cells))
 
