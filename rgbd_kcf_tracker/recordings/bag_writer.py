@@ -65,8 +65,9 @@ GENERIC = CameraTopics('/color/image', '/depth/image', '/color/camera_info', 'ca
 class BagWriter:
     """Writes mcap: images as a camera sends them, and the tracker's topics beside them.
 
-    Every message's time of recording is its frame's stamp. What was written before an interruption,
-    kill -9 included, stays readable: it is a file without index, which ``convert`` mends.
+    Every message's time of recording is its frame's stamp. When a ``write`` returns, the system has
+    what it wrote: an interruption, kill -9 included, leaves a file without index that is read up to
+    there, and that ``convert`` mends.
 
     Args:
         path: the file; missing folders are made.
@@ -109,6 +110,7 @@ class BagWriter:
         if frame.depth is not None:
             image = encode_depth(frame.depth, self._depth_encoding)
             self._write_image(self.topics.depth, header, frame, image)
+        self._writer.flush()
 
     def write_track(self, frame: Frame, track: Track) -> None:
         """Write what the tracker node publishes: box and occluded; roi, position, marker if any."""
@@ -126,6 +128,7 @@ class BagWriter:
             packed = encode_compressed_color(draw_track(frame.color, track), quality=80)
             image = types()['sensor_msgs/msg/CompressedImage'](header, packed.format, packed.data)
             self._write_tracker('image_annotated/compressed', image, stamp)
+        self._writer.flush()
 
     def write_truth(self, frame: Frame, visible: Box | None, body: Box | None = None) -> None:
         """Write the true box of the visible part, and the whole body's where there is one.
@@ -135,6 +138,7 @@ class BagWriter:
         header = self._header(frame)
         self._writer.write(TRUTH_VISIBLE, make.polygon(header, visible), frame.stamp_ns)
         self._writer.write(TRUTH_BODY, make.polygon(header, body), frame.stamp_ns)
+        self._writer.flush()
 
     def close(self) -> None:
         """Write the index and close the file."""

@@ -95,7 +95,9 @@ class McapStorage:
             body = at + _RECORD.size
             at = body + length
             if opcode == _DATA_END:
-                return
+                if self._file.read(end - len(MAGIC), len(MAGIC)) == MAGIC:
+                    return
+                break
             if opcode == _CHUNK:
                 yield from self._chunk(body, min(length, end - body))
             elif opcode == 0:

@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.recordings.storage import Definition
 COMPRESSIONS = ('none', 'lz4', 'zstd')
 
 # Large enough for the index to stay small, small enough that a kill loses little: an image fills a
-# chunk by itself, and what is written is handed to the system after each message.
+# chunk by itself.
 _CHUNK = 256 * 1024
 
 
@@ -95,6 +95,17 @@ class McapWriter:
                 channel, log_ns, cast(bytes, data), publish_time=log_ns, sequence=number
             )
             self._file.flush()
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+
+    def flush(self) -> None:
+        """Hand all that was written to the system: from here on a kill loses none of it.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+        try:
+            cast(Any, self._writer).flush()
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
 

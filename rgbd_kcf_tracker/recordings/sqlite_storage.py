@@ -8,9 +8,11 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.sqlite_pages import is_cut_off, whole_rows
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 
 MAGIC = b'SQLite format 3\0'
@@ -67,12 +69,8 @@ class SqliteStorage:
         except sqlite3.Error as error:
             raise RecordingError(f'{self.path} is no rosbag2 database: {error}') from None
         self._read_definitions()
-        query = (
-            f'SELECT id, topic_id, timestamp, length(data), substr(data, 1, {HEAD}) '
-            'FROM messages ORDER BY id'
-        )
         try:
-            for number, topic, log_ns, length, data in self._database.execute(query):
+            for number, topic, log_ns, length, data in self._rows():
                 if topic in names and isinstance(data, bytes):
                     yield Scanned(*names[topic], log_ns, data, (-1, number, length))
         except sqlite3.Error as error:
@@ -80,6 +78,17 @@ class SqliteStorage:
                 f'{self.path} is damaged or was cut off ({error}): '
                 'the messages before that place are read'
             )
+
+    def _rows(self) -> Iterator[tuple[Any, ...]]:
+        columns = f'SELECT id, topic_id, timestamp, length(data), substr(data, 1, {HEAD})'
+        if not is_cut_off(self.path):
+            yield from self._database.execute(f'{columns} FROM messages ORDER BY id')
+            return
+        self.warnings.append(f'{self.path} was cut off: all whole messages in it are read')
+        query = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
+        (root,) = self._database.execute(query).fetchone()
+        for number in whole_rows(self.path, int(root)):
+            yield from self._database.execute(f'{columns} FROM messages WHERE id = ?', (number,))
 
     def _read_definitions(self) -> None:
         query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'

@@ -1,0 +1,623 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Bags of every format: whole, compressed, without index, cut off, killed, empty, and no bags."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bag_rig import (
+    CAMERA,
+    COLOR,
+    DEPTH,
+    INFO,
+    SIZE,
+    START_NS,
+    STEP_NS,
+    Sent,
+    assert_same_frames,
+    camera_messages,
+    image,
+    make_frames,
+    write_mcap,
+    write_ros1,
+    write_rosbag2,
+)
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import (
+    BagWriter,
+    CameraTopics,
+    ReadOptions,
+    SequenceWriter,
+    open_recording,
+)
+from rgbd_kcf_tracker.recordings.copying import copy_bag
+from rgbd_kcf_tracker.recordings.encoding import (
+    encode_bare_depth,
+    encode_color,
+    encode_compressed_color,
+    encode_compressed_depth,
+    encode_depth,
+)
+from rgbd_kcf_tracker.recordings.rawbag import RawBag
+
+FRAMES = make_frames()
+
+
+def read(path: Path, options: ReadOptions | None = None) -> tuple[list[Frame], list[str]]:
+    with open_recording(path, options) as recording:
+        frames = list(recording.frames())
+        assert len(frames) == len(recording)
+        return frames, recording.warnings
+
+
+def without_metadata(folder: Path) -> Path:
+    (folder / 'metadata.yaml').unlink()
+    return folder
+
+
+def sequence_folder(folder: Path, frames: list[Frame]) -> Path:
+    with SequenceWriter(folder) as writer:
+        for frame in frames:
+            writer.write(frame, Box(1, 2, 3, 4))
+    return folder
+
+
+WRITERS: dict[str, Any] = {
+    'mcap': lambda p, s: write_mcap(p / 'a.mcap', s),
+    'mcap lz4': lambda p, s: write_mcap(p / 'a.mcap', s, 'lz4'),
+    'mcap zstd': lambda p, s: write_mcap(p / 'a.mcap', s, 'zstd'),
+    'folder mcap': lambda p, s: write_rosbag2(p / 'a', s),
+    'folder mcap, no metadata': lambda p, s: without_metadata(write_rosbag2(p / 'a', s)),
+    'folder mcap, messages packed': lambda p, s: write_rosbag2(p / 'a', s, compression='MESSAGE'),
+    'folder mcap, file packed': lambda p, s: write_rosbag2(p / 'a', s, compression='FILE'),
+    'file in a folder': lambda p, s: next(write_rosbag2(p / 'a', s).glob('*.mcap')),
+    'folder sqlite3': lambda p, s: write_rosbag2(p / 'a', s, 'SQLITE3'),
+    'folder sqlite3, no metadata': lambda p, s: without_metadata(
+        write_rosbag2(p / 'a', s, 'SQLITE3')
+    ),
+    'folder sqlite3, messages packed': lambda p, s: write_rosbag2(p / 'a', s, 'SQLITE3', 'MESSAGE'),
+    'folder sqlite3, file packed': lambda p, s: write_rosbag2(p / 'a', s, 'SQLITE3', 'FILE'),
+    'db3': lambda p, s: next(write_rosbag2(p / 'a', s, 'SQLITE3').glob('*.db3')),
+    'ROS 1': lambda p, s: write_ros1(p / 'a.bag', s),
+    'ROS 1 bz2': lambda p, s: write_ros1(p / 'a.bag', s, 'BZ2'),
+    'ROS 1 lz4': lambda p, s: write_ros1(p / 'a.bag', s, 'LZ4'),
+}
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+def test_every_format_gives_the_same_frames(kind: str, tmp_path: Path) -> None:
+    path = WRITERS[kind](tmp_path, camera_messages(FRAMES))
+    frames, warnings = read(path)
+    assert_same_frames(frames, FRAMES)
+    assert [w for w in warnings if 'no metadata.yaml' not in w] == []
+    assert bool(warnings) == ('no metadata' in kind)
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+def test_every_format_converts_to_an_mcap_that_others_read(kind: str, tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    bag = RawBag(WRITERS[kind](tmp_path, sent))
+    count, warnings = copy_bag(bag, tmp_path / 'out.mcap', compression='zstd')
+    bag.close()
+    assert (count, warnings) == (len(sent), [])
+    assert_same_frames(read(tmp_path / 'out.mcap')[0], FRAMES)
+    with (tmp_path / 'out.mcap').open('rb') as file:
+        reader = make_reader(file, validate_crcs=True)
+        messages = [(c.topic, m.log_time) for _, c, m in reader.iter_messages()]
+    assert messages == [(s.topic, s.log_ns) for s in sent]
+
+
+def test_part_of_a_recording(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))
+    with open_recording(path) as recording:
+        assert_same_frames(list(recording.frames(2, 4)), FRAMES[2:4])
+        assert_same_frames(list(recording.frames(4, 99)), FRAMES[4:])
+        assert list(recording.frames(3, 3)) == []
+
+
+def test_a_bag_in_several_files_is_one(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    (tmp_path / 'a').mkdir()
+    # Ten comes after nine, whatever the order of letters.
+    write_mcap(tmp_path / 'a' / 'a_9.mcap', sent[:7])
+    write_mcap(tmp_path / 'a' / 'a_10.mcap', sent[7:])
+    assert_same_frames(read(tmp_path / 'a')[0], FRAMES)
+
+
+# -- encodings through a bag -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('bag', ['mcap', 'ROS 1'])
+@pytest.mark.parametrize(
+    'depth',
+    ['16UC1', '32FC1', 'bigendian', 'compressedDepth png', 'compressedDepth rvl', 'png', 'tiff'],
+)
+@pytest.mark.parametrize('color', ['rgb8', 'bgra8', 'png'])
+def test_encodings_through_a_bag(color: str, depth: str, bag: str, tmp_path: Path) -> None:
+    sent = []
+    for f in FRAMES[:2]:
+        assert f.depth is not None
+        if color == 'png':
+            packed: Any = encode_compressed_color(f.color, 'png')
+            sent.append(Sent(COLOR + '/compressed', f.stamp_ns, image(f.stamp_ns, packed)))
+        else:
+            packed = encode_color(f.color, color, padding=4)
+            sent.append(Sent(COLOR, f.stamp_ns, image(f.stamp_ns, packed)))
+        topic = DEPTH
+        if depth in ('16UC1', '32FC1'):
+            packed = encode_depth(f.depth, depth, padding=8)
+        elif depth == 'bigendian':
+            packed = encode_depth(f.depth, bigendian=True)
+        elif depth in ('png', 'tiff'):
+            packed, topic = encode_bare_depth(f.depth, depth), DEPTH + '/compressed'
+        else:
+            packed = encode_compressed_depth(f.depth, codec=depth.split()[1])
+            topic = DEPTH + '/compressedDepth'
+        sent.append(Sent(topic, f.stamp_ns, image(f.stamp_ns, packed)))
+    frames, _ = read(WRITERS[bag](tmp_path, sent))
+    assert_same_frames(frames, [dataclasses.replace(f, intrinsics=None) for f in FRAMES[:2]])
+
+
+def test_unknown_encoding_names_topic_and_encoding(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    for s in sent:
+        if s.topic == COLOR:
+            s.message.encoding = 'bayer_grbg8'
+    path = write_mcap(tmp_path / 'a.mcap', sent)
+    with pytest.raises(ImageError, match=f'frame 0 of {COLOR}.*bayer_grbg8.*readable are bgr8'):
+        read(path)
+    sent = camera_messages(FRAMES)
+    for s in sent:
+        if s.topic == DEPTH:
+            s.message.encoding = '16SC1'
+    path = write_mcap(tmp_path / 'b.mcap', sent)
+    with pytest.raises(ImageError, match=f'frame 0 of {DEPTH}.*16SC1.*readable are 16UC1'):
+        read(path)
+
+
+def test_depth_of_another_size_says_what_to_do(tmp_path: Path) -> None:
+    frames = make_frames(2)
+    small = make_frames(2, (32, 24))
+    sent = camera_messages(frames, depth=None) + camera_messages(small, color='/x')
+    sent = [s for s in sent if s.topic != '/x']
+    path = write_mcap(tmp_path / 'a.mcap', sent)
+    with pytest.raises(ImageError, match=r'depth is 32x24 but colour is 64x48: register'):
+        read(path)
+
+
+def test_size_may_change_on_the_way(tmp_path: Path) -> None:
+    frames = make_frames(6)
+    frames[3:] = [
+        dataclasses.replace(f, stamp_ns=g.stamp_ns)
+        for f, g in zip(make_frames(6, (32, 24))[3:], frames[3:], strict=True)
+    ]
+    path = write_mcap(tmp_path / 'a.mcap', camera_messages(frames))
+    found, warnings = read(path)
+    assert_same_frames(found, frames)
+    assert any('changes from 64x48 to 32x24 at frame 3' in w for w in warnings)
+
+
+def test_one_damaged_depth_image_costs_its_depth_only(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    damaged = [s for s in sent if s.topic == DEPTH][2]
+    damaged.message.data = damaged.message.data[:100]
+    frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+    assert [f.depth is None for f in frames] == [False, False, True, False, False, False]
+    assert any('frame 2' in w and 'cut off' in w for w in warnings)
+
+
+def test_a_damaged_colour_image_is_named(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    damaged = [s for s in sent if s.topic == COLOR][2]
+    damaged.message.data = damaged.message.data[:100]
+    with pytest.raises(ImageError, match=f'frame 2 of {COLOR}.*cut off'):
+        read(write_mcap(tmp_path / 'a.mcap', sent))
+
+
+# -- time --------------------------------------------------------------------------------------
+
+
+def test_messages_out_of_order_are_put_right(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    order = [1, 0, 4, 2, 3, 5, 8, 7, 6, 11, 9, 10, 12, 17, 13, 14, 16, 15]
+    shuffled = [dataclasses.replace(sent[i], log_ns=START_NS + n) for n, i in enumerate(order)]
+    frames, warnings = read(write_mcap(tmp_path / 'a.mcap', shuffled))
+    assert_same_frames(frames, FRAMES)
+    assert warnings == []
+
+
+def test_messages_twice_are_read_once(tmp_path: Path) -> None:
+    sent = [s for s in camera_messages(FRAMES) for _ in range(2)]
+    frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+    assert_same_frames(frames, FRAMES)
+    assert any('12 images have a stamp that was there before' in w for w in warnings)
+
+
+def test_time_that_jumps_back_starts_afresh(tmp_path: Path) -> None:
+    """A bag that looped while it was recorded: the second round comes after the first."""
+    frames = [
+        dataclasses.replace(f, stamp_ns=START_NS + n * 400_000_000) for n, f in enumerate(FRAMES)
+    ]
+    once = camera_messages(frames)
+    length = once[-1].log_ns - once[0].log_ns + STEP_NS
+    again = [dataclasses.replace(s, log_ns=s.log_ns + length) for s in once]
+    found, warnings = read(write_mcap(tmp_path / 'a.mcap', once + again))
+    assert_same_frames(found, frames + frames)
+    assert any('jumps back 1 time' in w for w in warnings)
+
+
+def test_rates_may_differ(tmp_path: Path) -> None:
+    depths = 0
+    sent = []
+    for s in camera_messages(FRAMES):
+        if s.topic == DEPTH:
+            depths += 1
+            if depths % 2 == 0:
+                continue
+        sent.append(s)
+    frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+    assert [f.depth is not None for f in frames] == [True, False] * 3
+    assert any('3 of 6 colour images have no depth' in w for w in warnings)
+
+
+def test_stamps_that_say_nothing_give_way_to_the_time_of_recording(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    for s in sent:
+        s.message.header.stamp.sec = s.message.header.stamp.nanosec = 0
+    frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+    assert [f.stamp_ns for f in frames] == [f.stamp_ns + 2_000_000 for f in FRAMES]
+    assert all(f.depth is not None for f in frames)
+    assert any('the time of recording is taken' in w for w in warnings)
+
+
+def test_nearest_stamp_within_the_tolerance(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    for s in sent:
+        if s.topic == DEPTH:
+            s.message.header.stamp.nanosec += 7_000_000
+    path = write_mcap(tmp_path / 'a.mcap', sent)
+    assert_same_frames(read(path)[0], FRAMES)
+    frames, _ = read(path, ReadOptions(tolerance_s=0.005))
+    assert all(f.depth is None for f in frames)
+
+
+def test_slow_shots_are_paired_widely_with_a_warning(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES[:1])
+    sent[2].message.header.stamp.nanosec += 200_000_000
+    path = write_mcap(tmp_path / 'a.mcap', sent)
+    frames, warnings = read(path)
+    assert frames[0].depth is not None
+    assert any('paired up to 200 ms apart' in w for w in warnings)
+    assert read(path, ReadOptions(tolerance_s=0.02))[0][0].depth is None
+
+
+# -- what is no bag, empty, or damaged ---------------------------------------------------------
+
+
+@pytest.mark.parametrize('name', ['a.mcap', 'a.bag', 'a.db3', 'a.txt'])
+def test_a_file_that_is_no_bag(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b'hello, this is a letter and no recording')
+    with pytest.raises(RecordingError, match=f'{name} is no recording'):
+        read(tmp_path / name)
+    (tmp_path / name).write_bytes(b'')
+    with pytest.raises(RecordingError, match=f'{name} is empty'):
+        read(tmp_path / name)
+
+
+def test_what_is_not_there_or_holds_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match='does not exist'):
+        read(tmp_path / 'missing.mcap')
+    (tmp_path / 'empty').mkdir()
+    with pytest.raises(RecordingError, match='holds neither'):
+        read(tmp_path / 'empty')
+    (tmp_path / 'several').mkdir()
+    for name in ('a.bag', 'b.bag'):
+        (tmp_path / 'several' / name).touch()
+    with pytest.raises(RecordingError, match='name one of them'):
+        read(tmp_path / 'several')
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'folder sqlite3', 'ROS 1'])
+def test_an_empty_bag_lists_what_it_has(kind: str, tmp_path: Path) -> None:
+    path = WRITERS[kind](tmp_path, [])
+    with pytest.raises(RecordingError, match=r'no colour topic.*no topics at all'):
+        read(path)
+
+
+def test_metadata_that_lies_is_left_out(tmp_path: Path) -> None:
+    folder = write_rosbag2(tmp_path / 'a', camera_messages(FRAMES))
+    (folder / 'metadata.yaml').write_text(': : {{{ not yaml')
+    frames, warnings = read(folder)
+    assert_same_frames(frames, FRAMES)
+    assert any('cannot be understood' in w for w in warnings)
+
+
+CUTS = ['mcap', 'mcap lz4', 'mcap zstd', 'ROS 1', 'ROS 1 bz2', 'ROS 1 lz4']
+
+
+def many_messages() -> list[Sent]:
+    return camera_messages(make_frames(8))
+
+
+@pytest.mark.parametrize('kind', CUTS)
+def test_a_bag_cut_off_anywhere_gives_what_is_whole(kind: str, tmp_path: Path) -> None:
+    """At any byte: no crash, only good messages, and never fewer from a longer file."""
+    sent = many_messages()
+    path = WRITERS[kind](tmp_path, sent)
+    data = path.read_bytes()
+    expected = make_frames(8)
+    counts = []
+    cut = tmp_path / f'cut{path.suffix}'
+    for length in range(20, len(data), len(data) // 41):
+        cut.write_bytes(data[:length])
+        bag = RawBag(cut)
+        counts.append(sum(len(t) for t in bag.topics.values()))
+        assert any('cut off or not closed' in w for w in bag.warnings)
+        bag.close()
+        if counts[-1] >= 3:
+            frames, warnings = read(cut)
+            full = frames if frames[-1].depth is not None else frames[:-1]
+            assert_same_frames(full, expected[: len(full)])
+            assert any('cut off or not closed' in w for w in warnings)
+    assert counts == sorted(counts)
+    assert counts[0] == 0
+    # bz2 packs 900 kB into one block, of which a part gives nothing.
+    assert counts[-1] >= (0 if kind == 'ROS 1 bz2' else len(sent) // 2)
+
+
+def test_an_uncompressed_bag_gives_every_whole_message(tmp_path: Path) -> None:
+    """Also those in a chunk whose end is missing."""
+    for kind in ('mcap', 'ROS 1'):
+        path = WRITERS[kind](tmp_path, many_messages())
+        bag = RawBag(path)
+        ends = []
+        for topic, index in bag.in_order():
+            _, _, at, length = topic.places[4 * index : 4 * index + 4]
+            ends.append(at + length)
+        bag.close()
+        data = path.read_bytes()
+        for end in ends[1::5]:
+            for length in (end - 1, end):
+                path.write_bytes(data[:length])
+                bag = RawBag(path)
+                found = sum(len(t) for t in bag.topics.values())
+                bag.close()
+                assert found == sum(e <= length for e in ends)
+
+
+def test_a_cut_off_database_gives_what_is_whole(tmp_path: Path) -> None:
+    path = WRITERS['db3'](tmp_path, many_messages())
+    data = path.read_bytes()
+    counts = []
+    for length in range(1000, len(data), len(data) // 40):
+        path.write_bytes(data[:length])
+        counts.append(0)
+        with suppress(RecordingError):
+            frames, warnings = read(path)
+            whole = [f for f in frames if f.depth is not None]
+            assert_same_frames(whole, make_frames(8)[: len(whole)])
+            assert any('cut off' in w for w in warnings)
+            counts[-1] = len(whole)
+    assert counts == sorted(counts)
+    assert counts[-1] >= 6
+
+
+def test_convert_mends_a_bag_that_was_cut_off(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / 'a.mcap', many_messages())
+    path.write_bytes(path.read_bytes()[:60000])
+    frames, _ = read(path)
+    bag = RawBag(path)
+    copy_bag(bag, tmp_path / 'mended.mcap')
+    bag.close()
+    mended, warnings = read(tmp_path / 'mended.mcap')
+    assert_same_frames(mended, frames)
+    assert not any('cut off' in w for w in warnings)
+
+
+def test_missing_index(tmp_path: Path) -> None:
+    """The summary of an mcap, or the index of a ROS 1 bag, is taken away."""
+    path = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))
+    with path.open('rb') as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    end = max(c.chunk_start_offset + c.chunk_length for c in summary.chunk_indexes)
+    path.write_bytes(path.read_bytes()[:end])
+    assert_same_frames(read(path)[0], FRAMES)
+    path = write_ros1(tmp_path / 'a.bag', camera_messages(FRAMES))
+    data = bytearray(path.read_bytes())
+    at = data.index(b'index_pos=') + len(b'index_pos=')
+    end = int.from_bytes(data[at : at + 8], 'little')
+    data[at : at + 8] = bytes(8)
+    path.write_bytes(data[:end])
+    frames, warnings = read(path)
+    assert_same_frames(frames, FRAMES)
+    assert any('not closed' in w for w in warnings)
+
+
+_SOURCES = {
+    kind: camera_messages(make_frames(2, (16, 12)))
+    for kind in ('mcap', 'mcap zstd', 'ROS 1', 'db3')
+}
+
+
+@settings(
+    max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.sampled_from(sorted(_SOURCES)),
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 255)), max_size=8),
+    st.booleans(),
+)
+def test_damaged_bytes_never_crash_the_reader(
+    tmp_path_factory: pytest.TempPathFactory,
+    kind: str,
+    changes: list[tuple[float, int]],
+    early: bool,
+) -> None:
+    """Frames, or an error of ours; whatever the damage."""
+    folder = tmp_path_factory.mktemp('bag')
+    path = WRITERS[kind](folder, _SOURCES[kind])
+    data = bytearray(path.read_bytes())
+    for place, value in changes:
+        data[16 + int(place * ((1000 if early else len(data)) - 17))] = value
+    path.write_bytes(data)
+    with suppress(RgbdKcfError), open_recording(path) as recording:
+        for frame in recording.frames():
+            frame.color.sum()
+
+
+WRITE_FOR_EVER = """
+import sys
+import dataclasses
+from bag_rig import make_frames
+from rgbd_kcf_tracker.recordings import BagWriter, KINECT2_QHD
+from rgbd_kcf_tracker.trackers import Track, TrackState
+from rgbd_kcf_tracker.geometry import Box
+
+frames = make_frames(3)
+with BagWriter(sys.argv[1], KINECT2_QHD, compression=sys.argv[2]) as writer:
+    for number in range(10**9):
+        base = frames[number % 3]
+        frame = dataclasses.replace(base, stamp_ns=base.stamp_ns + number * 10**9)
+        writer.write_frame(frame)
+        writer.write_track(frame, Track(Box(number, 1, 2, 3), TrackState.TRACKING, 0.5))
+        print(number, flush=True)
+"""
+
+
+@pytest.mark.parametrize('compression', ['none', 'zstd'])
+@pytest.mark.parametrize('after_s', [0.0, 0.05, 0.33])
+def test_what_was_written_is_there_after_kill_9(
+    compression: str, after_s: float, tmp_path: Path
+) -> None:
+    path = tmp_path / 'a.mcap'
+    process = subprocess.Popen(
+        [sys.executable, '-c', WRITE_FOR_EVER, str(path), compression],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join([*sys.path, str(Path(__file__).parent)])},
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(after_s)
+    process.send_signal(signal.SIGKILL)
+    numbers = process.stdout.read().split()
+    process.wait()
+    reported = 1 + (int(numbers[-1]) if numbers else 0)
+    bases = make_frames(3)
+    with open_recording(path) as recording:
+        frames = list(recording.frames())
+        assert any('cut off or not closed' in w for w in recording.warnings)
+    assert reported <= len(frames) <= reported + 1
+    for number, frame in enumerate(frames[:reported]):
+        base = bases[number % 3]
+        assert frame.stamp_ns == base.stamp_ns + number * 10**9
+        assert np.array_equal(frame.color, base.color)
+        assert np.array_equal(frame.depth, base.depth, equal_nan=True)
+    bag = RawBag(path)
+    assert len(bag.topics['/tracker/box']) >= reported
+    bag.close()
+
+
+# -- cameras, ground truth ---------------------------------------------------------------------
+
+
+def test_intrinsics_of_the_recording_or_given(tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))
+    with open_recording(path) as recording:
+        assert recording.intrinsics == CAMERA
+    other = dataclasses.replace(CAMERA, fx=99.0)
+    assert read(path, ReadOptions(intrinsics=other))[0][0].intrinsics == other
+
+
+def test_camera_info_that_is_none(tmp_path: Path) -> None:
+    for change, words in (
+        ({'k': np.zeros(9), 'p': np.zeros(12)}, 'not calibrated'),
+        ({'k': np.full(9, -5.0)}, 'no camera'),
+        ({'k': np.full(9, np.nan)}, 'no camera'),
+        ({'width': 1920, 'height': 1080}, 'is for 1920x1080 images'),
+    ):
+        sent = camera_messages(FRAMES)
+        for s in sent:
+            if s.topic == INFO:
+                for name, value in change.items():
+                    setattr(s.message, name, value)
+        frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+        assert frames[0].intrinsics is None
+        assert any(words in w for w in warnings), warnings
+
+
+def test_ground_truth_of_a_bag_is_that_of_the_folder(tmp_path: Path) -> None:
+    boxes = [
+        None,
+        Box(367.8, 163.3, 33.8, 40.2),
+        Box(0.123, 5, 6.1, 7),
+        None,
+        Box(1, 2, 3, 4),
+        None,
+    ]
+    bodies = [Box(0, 0, 60, 40)] * 5 + [None]
+    topics = CameraTopics(COLOR, DEPTH, INFO, 'optical')
+    with BagWriter(tmp_path / 'a.mcap', topics) as bag, SequenceWriter(tmp_path / 'a') as folder:
+        for frame, box, body in zip(FRAMES, boxes, bodies, strict=True):
+            bag.write_frame(frame)
+            bag.write_truth(frame, box, body)
+            folder.write(frame, box, body)
+    for path in (tmp_path / 'a.mcap', tmp_path / 'a'):
+        with open_recording(path) as recording:
+            assert recording.groundtruth == boxes
+            assert recording.groundtruth_body == bodies
+            assert_same_frames(list(recording.frames()), FRAMES)
+            info = recording.info()
+            assert (info.frames, info.frames_with_depth, info.truth_frames) == (6, 6, 3)
+            assert info.rate_hz == pytest.approx(30, abs=0.1)
+
+
+def test_info_of_a_bag(tmp_path: Path) -> None:
+    with open_recording(write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))) as recording:
+        info = recording.info()
+    streams = {s.name: s for s in info.streams}
+    assert streams[COLOR].role == 'color'
+    assert (streams[DEPTH].size, streams[DEPTH].encoding) == (SIZE, '16UC1')
+    assert streams[INFO].count == 6
+    assert info.intrinsics == CAMERA
+
+
+# -- real bags ---------------------------------------------------------------------------------
+
+
+def test_the_real_ros_1_bags_open(shared_data: Path, tmp_path: Path) -> None:
+    paths = sorted((shared_data / 'bags' / 'hero' / 'bags').glob('*.bag'))
+    assert len(paths) == 5
+    with open_recording(shared_data / 'bags' / 'hero') as converted:
+        expected = list(converted.frames())
+    for path, other in zip(paths, expected, strict=True):
+        (frame,), _ = read(path)
+        assert np.array_equal(frame.color, other.color)
+        assert frame.depth is not None
+        assert other.depth is not None
+        assert np.nanmax(np.abs(frame.depth - other.depth)) < 0.001
+        assert frame.intrinsics is not None
+        assert frame.intrinsics.fx == pytest.approx(537.03, abs=0.01)
+        bag = RawBag(path)
+        assert copy_bag(bag, tmp_path / 'a.mcap') == (3, [])
+        bag.close()
+        assert_same_frames(read(tmp_path / 'a.mcap')[0], [frame])
