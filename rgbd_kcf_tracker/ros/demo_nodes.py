@@ -1,0 +1,92 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The demo's nodes as processes of their own, apart from any other ROS on the network."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+
+STOP_S = 5.0
+
+
+class DemoError(RgbdKcfError):
+    """A step of the demo failed."""
+
+
+def keep_to_this_machine(log_folder: Path) -> None:
+    """Set this process's ROS environment, which its children take over.
+
+    A domain of its own, this host only, found without multicast too (containers often have none),
+    and logs beside the results instead of in the home folder. Domains above 101 would take ports
+    from the range in which Linux gives them to others.
+    """
+    log_folder.mkdir(parents=True, exist_ok=True)
+    os.environ['ROS_DOMAIN_ID'] = str(random.randint(10, 100))
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['ROS_STATIC_PEERS'] = '127.0.0.1'
+    os.environ['ROS_LOG_DIR'] = str(log_folder)
+    os.environ.pop('ROS_LOCALHOST_ONLY', None)
+
+
+@contextmanager
+def node(
+    executable: str,
+    parameters: Mapping[str, object],
+    remaps: Mapping[str, str],
+    folder: Path,
+) -> Iterator[subprocess.Popen[bytes]]:
+    """A node of this package; told to stop, and waited for, at the end of the ``with`` block.
+
+    Args:
+        executable: 'tracker' or 'replay'.
+        parameters: its ROS parameters.
+        remaps: topic names, from and to.
+        folder: for its parameter file and its output.
+
+    Raises:
+        DemoError: where it ends with an error.
+    """
+    settings = folder / f'{executable}.yaml'
+    lines = [f'    {name}: {json.dumps(value)}' for name, value in parameters.items()]
+    settings.write_text('\n'.join(['/**:', '  ros__parameters:', *lines]) + '\n', encoding='utf-8')
+    command = [sys.executable, '-m', f'rgbd_kcf_tracker.ros.{executable}_main', '--ros-args']
+    command += ['--params-file', str(settings)]
+    for old, new in remaps.items():
+        command += ['-r', f'{old}:={new}']
+    output = folder / f'{executable}.log'
+    with output.open('ab') as log:
+        process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+    try:
+        yield process
+    finally:
+        stop(process)
+    if process.returncode != 0:
+        raise DemoError(f'{executable} ended with status {process.returncode}: {last_line(output)}')
+
+
+def stop(process: subprocess.Popen[bytes]) -> None:
+    """End a node as Ctrl-C would, and by force if that does not help."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        try:
+            process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def last_line(path: Path) -> str:
+    """The last line of a log, for an error message."""
+    lines = path.read_text(encoding='utf-8', errors='replace').strip().splitlines()
+    return lines[-1] if lines else f'{path} is empty'
