@@ -14,7 +14,13 @@ from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets import folder, otb, princeton, recorded, simulated, vot
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, entries
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    Opened,
+    Sample,
+    Sequence,
+    UnreadableError,
+    entries,
+)
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
@@ -99,16 +105,16 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
 
 
 def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
-    here = _sequences_at(path, options)
-    if here or depth == 0 or not path.is_dir():
-        return here
-    found = []
-    for child in sorted(entries(path), key=lambda p: natural_key(p.name)):
-        try:
-            found.extend(_walk(child, options, depth - 1))
-        except (OSError, DatasetError) as error:
-            found.append(_broken(child, str(error)))
-    return found
+    try:
+        here = _sequences_at(path, options)
+        if here or depth == 0 or not path.is_dir():
+            return here
+        children = sorted(entries(path), key=lambda p: natural_key(p.name))
+    except (OSError, UnreadableError) as error:
+        if depth == _DEPTH:
+            raise DatasetError(str(error)) from None
+        return [_broken(path, str(error))]
+    return [sequence for child in children for sequence in _walk(child, options, depth - 1)]
 
 
 def _broken(path: Path, reason: str) -> Sequence:

@@ -21,6 +21,10 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 
 
+class UnreadableError(DatasetError):
+    """A folder cannot be read."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
     """One frame and its truth.
@@ -138,12 +142,12 @@ def entries(path: Path) -> list[Path]:
     """What is in a folder, hidden things left out.
 
     Raises:
-        DatasetError: where it cannot be read.
+        UnreadableError: where it cannot be read.
     """
     try:
         return [p for p in path.iterdir() if not p.name.startswith('.')]
     except OSError as error:
-        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+        raise UnreadableError(f'{path} cannot be read: {error.strerror or error}') from None
 
 
 def group(path: Path) -> str:

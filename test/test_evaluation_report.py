@@ -1,0 +1,382 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables, plots and the page, and the command that makes them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.evaluation import strips, tables, thesis, thesis_tables
+from rgbd_kcf_tracker.evaluation.categories import derive
+from rgbd_kcf_tracker.evaluation.measured import Measured
+from rgbd_kcf_tracker.evaluation.metrics import compare, princeton, vot
+from rgbd_kcf_tracker.evaluation.perframe import Info, Result, read_per_frame, write_per_frame
+from rgbd_kcf_tracker.evaluation.store import Truth
+from rgbd_kcf_tracker.evaluation.table import Table
+from rgbd_kcf_tracker.geometry import Box
+
+TRUTH = Box(10, 10, 20, 20)
+AWAY = Box(200, 100, 20, 20)
+SPLITS = tuple(princeton.CATEGORIES)
+HIDDEN = dict(zip(SPLITS, ('human', 'large', 'slow', 'yes', 'active'), strict=True))
+FAST = dict(zip(SPLITS, ('rigid', 'small', 'fast', 'no', 'passive'), strict=True))
+
+
+def result(tracker: str, sequence: str, said, there, score: float = 0.8) -> Result:
+    frames = compare(said, there, scores=np.full(len(said), score), skip=0)
+    count = len(said)
+    stamps = tuple(i * 100_000_000 for i in range(count))
+    return Result(tracker, sequence, stamps, frames, np.full(count, np.nan), np.full(count, 4.0))
+
+
+@pytest.fixture
+def results() -> list[Result]:
+    """Two sequences: in the first the target hides for two of five frames, in the second never."""
+    hides = [TRUTH, TRUTH, None, None, TRUTH]
+    return [
+        result('kcf', 'a', [TRUTH, TRUTH, AWAY, AWAY, AWAY], hides),
+        result('rgbd', 'a', [TRUTH, TRUTH, None, None, TRUTH.moved(1, 0)], hides),
+        result('kcf', 'b', [TRUTH] * 3, [TRUTH] * 3),
+        result('rgbd', 'b', [TRUTH, TRUTH, None], [TRUTH] * 3),
+    ]
+
+
+@pytest.fixture
+def measured(results: list[Result]) -> Measured:
+    infos = {
+        'a': Info('a', 'occlusion', 'sim', HIDDEN),
+        'b': Info('b', 'motion', 'sim', FAST),
+    }
+    return Measured(results, infos)
+
+
+def cells(table: Table, label: str) -> dict[str, object]:
+    (row,) = [r for r in table.rows if r[0] == label]
+    return dict(zip(table.columns, row, strict=True))
+
+
+def test_per_frame_file_gives_back_the_same_measures(tmp_path: Path, results: list[Result]):
+    path = tmp_path / 'per_frame.csv'
+    write_per_frame(path, results)
+    again = read_per_frame(path)
+    assert len(path.read_text().splitlines()) == 1 + 5 + 5 + 3 + 3
+    for one, two in zip(results, again, strict=True):
+        for a, b in zip(_values(one), _values(two), strict=True):
+            assert a == pytest.approx(b, nan_ok=True, rel=1e-5)
+
+
+def _values(r: Result) -> list[float]:
+    m = r.measures()
+    return [getattr(m, name) for name in m.__slots__]
+
+
+def test_per_frame_file_that_is_damaged_is_named(tmp_path: Path, results: list[Result]):
+    path = tmp_path / 'per_frame.csv'
+    write_per_frame(path, results)
+    text = path.read_text()
+    path.write_text(text + 'kcf,a,1\n')
+    with pytest.raises(Exception, match=r'per_frame.csv, line 18: 3 cells'):
+        read_per_frame(path)
+
+
+def test_overview_is_the_mean_over_sequences(measured: Measured):
+    row = cells(tables.overview(measured), 'rgbd')
+    assert row['success %'] == pytest.approx(100 * (1 + 0.5) / 2)
+    assert row['recall of absence %'] == pytest.approx(100), 'only one sequence has absence'
+    assert row['TN %'] == pytest.approx(50), '2 of 2, and 0 of 1'
+    assert row['median ms'] == 4
+    assert cells(tables.overview(measured), 'kcf')['TN %'] is None
+
+
+def test_scenario_tables(measured: Measured):
+    success = tables.by_scenario(measured)[0]
+    assert cells(success, 'occlusion')['kcf'] == pytest.approx(25)
+    assert cells(success, 'motion')['kcf'] == pytest.approx(100)
+    assert cells(success, 'all')['kcf'] == pytest.approx(62.5)
+
+
+def test_table_3_2_has_scenarios_across_and_the_thesis_below(measured: Measured):
+    table = thesis_tables.table_3_2(measured, 'kcf')
+    assert table.columns == ('', 'occlusion', 'motion')
+    assert cells(table, 'data set 1')['occlusion'] == pytest.approx(1 / 4)
+    assert cells(table, 'average')['motion'] == 1
+    assert cells(table, 'thesis: KCF, average')['occlusion'] == 0.7008
+
+
+def test_table_4_1_splits_agree_with_the_overall(measured: Measured):
+    table = thesis_tables.table_4_1(measured)
+    row = cells(table, 'kcf')
+    assert row['occluded'] == pytest.approx(25)
+    assert row['not occluded'] == pytest.approx(100)
+    assert row['animal'] is None
+    assert row['all'] == pytest.approx((row['human'] + row['rigid']) / 2)
+    assert cells(table, 'thesis: RGB-D KCF')['occluded'] == 47
+    assert cells(table, 'number of sequences')['human'] == 1
+
+
+def test_tables_4_5_5_1_and_5_2(measured: Measured):
+    ap = cells(thesis_tables.table_4_5(measured), 'kcf')['AP %']
+    assert ap == pytest.approx(100 * (1 / 4 + 1) / 2)
+    by_key = {t.key: t for t in thesis_tables.matrices(measured)}
+    hidden = by_key['table_5_1']
+    assert cells(hidden, 'kcf')['TP %'] == pytest.approx(25)
+    assert cells(hidden, 'kcf')['TN %'] == 'cannot be determined'
+    assert cells(hidden, 'rgbd')['TN %'] == pytest.approx(100)
+    assert cells(hidden, 'thesis: RGB-D-PF')['TP %'] == 74.07
+    assert cells(by_key['table_5_2'], 'rgbd')['FN %'] == pytest.approx(100)
+    assert cells(by_key['confusion_method_1'], 'rgbd')['TP %'] == pytest.approx(100 * 3 / 6)
+
+
+def test_quoted_rows_of_the_thesis_add_up():
+    for rows in (thesis.KINECT_CONFUSION, thesis.OCCLUSION_CONFUSION, thesis.FAST_CONFUSION):
+        for tp, fp, fn, tn in rows.values():
+            assert tp + fp == pytest.approx(100)
+            assert fn is None or fn + tn == pytest.approx(100)
+
+
+def test_the_thesis_row_of_table_4_1_is_not_self_consistent():
+    """Weights that fit published rows: KCF's splits agree with each other, the thesis's do not."""
+    weights = ((0.43, 0.19, 0.38), (0.41, 0.59), (0.31, 0.69), (0.575, 0.425), (0.29, 0.71))
+
+    def spread(row: tuple[float, ...]) -> float:
+        means, start = [], 0
+        for share in weights:
+            means.append(float(np.dot(share, row[start : start + len(share)])))
+            start += len(share)
+        return max(means) - min(means)
+
+    assert spread(thesis.PRINCETON['thesis: KCF']) < 1
+    assert spread(thesis.PRINCETON['thesis: RGB-D KCF']) > 7
+
+
+def test_ablation_table_shows_what_is_lost(results: list[Result]):
+    renamed = [
+        Result('kcf without hog' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
+               r.frames, r.fraction, r.milliseconds)
+        for r in results
+    ]  # fmt: skip
+    infos = {n: Info(n, 's', 'sim', HIDDEN) for n in ('a', 'b')}
+    table = tables.ablation(Measured(renamed, infos), 'rgbd')
+    assert [row[0] for row in table.rows] == ['rgbd']
+    other = [
+        Result('rgbd without depth' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
+               r.frames, r.fraction, r.milliseconds)
+        for r in results
+    ]  # fmt: skip
+    table = tables.ablation(Measured(other, infos), 'rgbd')
+    change = {row[0]: row[2] for row in table.rows}
+    assert change == {'rgbd': None, 'rgbd without depth': pytest.approx(62.5 - 75)}
+
+
+def test_otb_table_counts_the_first_frame_as_the_benchmark_does(results: list[Result]):
+    infos = {n: Info(n, 'otb', 'otb', HIDDEN) for n in ('a', 'b')}
+    table = tables.otb_protocol(Measured(results, infos))
+    assert cells(table, 'kcf')['precision at 20 px'] == pytest.approx((2 / 3 + 1) / 2)
+    assert tables.otb_protocol(Measured(results, {n: Info(n, 's', 'sim') for n in 'ab'})) is None
+
+
+def test_short_term_table():
+    run = vot.ShortTermRun(np.array([1, *[3] * 19]), np.array([1.0, *[0.6] * 19]))
+    table = thesis_tables.short_term({('kcf', 'a'): run, ('kcf', 'b'): run})
+    row = cells(table, 'kcf')
+    assert row['accuracy'] == pytest.approx(0.6)
+    assert row['robustness (failures)'] == 0
+
+
+def test_scores_that_never_vary_have_no_reliability(measured: Measured):
+    table, found = tables.reliability(measured)
+    assert found == {}
+    assert cells(table, 'kcf')['Brier'] is None
+
+
+def test_interval_of_the_mean():
+    low, high = tables.bootstrap_interval(np.array([0.4, 0.5, 0.6, 0.5] * 20))
+    assert 0.47 < low < 0.5 < high < 0.53
+    assert math.isnan(tables.bootstrap_interval(np.array([0.4]))[0])
+
+
+def test_tables_as_csv_text_and_markdown():
+    table = Table('k', 'Title', ('tracker', 'a %'), (('x', 1.25), ('thesis: y', None)), best='max')
+    assert table.csv() == 'tracker,a %\nx,1.25\nthesis: y,\n'
+    assert table.text().splitlines() == [
+        'Title',
+        'tracker    a %',
+        'x          1.2',
+        'thesis: y    -',
+    ]
+    assert table.markdown().splitlines()[1] == '| --- | ---: |'
+    two = Table('k', 't', ('tracker', 'a'), (('x', 1.0), ('y', 2.0), ('thesis', 9.0)), best='max')
+    assert [two.is_best(row, 1) for row in two.rows] == [False, True, False]
+
+
+def truth_of(boxes: list[tuple[float, ...]], fraction: float = 1.0, hz: float = 10.0) -> Truth:
+    stamps = tuple(round(i * 1e9 / hz) for i in range(len(boxes)))
+    return Truth(stamps, np.array(boxes, np.float64), None, np.full(len(boxes), fraction))
+
+
+def test_categories_by_our_own_criteria():
+    still = truth_of([(0, 0, 20, 20)] * 5)
+    assert derive(still, (100, 100), 'normal') == dict(
+        zip(SPLITS, ('human', 'large', 'slow', 'no', 'active'), strict=True)
+    )
+    assert derive(still, (1000, 1000), 'small_animal')['target size'] == 'small'
+    assert derive(still, (100, 100), 'small_animal')['target type'] == 'animal'
+    assert derive(still, (100, 100), 'ball_game')['motion type'] == 'passive'
+    quick = truth_of([(5.0 * i, 0, 20, 20) for i in range(9)])  # 50 px/s, 2.5 sizes a second
+    assert derive(quick, (100, 100), 'x')['movement'] == 'fast'
+    assert derive(truth_of([(0, 0, 9, 9)] * 3, 0.3), (99, 99), 'x')['occlusion'] == 'yes'
+    gone = truth_of([(0, 0, 9, 9), (np.nan,) * 4, (0, 0, 9, 9)])
+    assert derive(gone, (99, 99), 'x')['occlusion'] == 'yes'
+
+
+def test_strips_choose_frames_spread_out_and_interesting():
+    kept = np.arange(0, 100, 2)
+    wrong = np.zeros(100, bool)
+    wrong[40:50] = True
+    chosen = strips.choose(kept, wrong)
+    assert len(chosen) == strips.FRAMES
+    assert chosen[0] == 0
+    assert chosen[-1] == 98
+    assert sum(40 <= i < 50 for i in chosen) >= 3
+    assert strips.choose(np.arange(3), wrong) == [0, 1, 2]
+
+
+def write_scene(path: Path, frames: int, shift: int) -> None:
+    """A folder in our layout: a patch walks over a wall and is gone for a while."""
+    rng = np.random.default_rng(shift)
+    wall = cv2.resize(rng.integers(0, 255, (12, 16, 3), np.uint8), (160, 120))
+    patch = cv2.resize(rng.integers(0, 255, (6, 4, 3), np.uint8), (30, 40))
+    lines = []
+    (path / 'rgb').mkdir(parents=True)
+    for i in range(frames):
+        image, x = wall.copy(), 20 + shift * i
+        gone = 8 <= i < 11
+        if not gone:
+            image[50:90, x : x + 30] = patch
+        lines.append('nan,nan,nan,nan' if gone else f'{x},50,30,40')
+        cv2.imwrite(str(path / 'rgb' / f'{i:06d}.png'), image)
+    (path / 'groundtruth.txt').write_text('\n'.join(lines) + '\n')
+
+
+class Page(HTMLParser):
+    """Collects the page's pictures, tables and outside links."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.images: list[str] = []
+        self.links: list[str] = []
+        self.tables = 0
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.tables += tag == 'table'
+        if tag == 'img':
+            self.images.append(values['src'])
+        self.links += [v for k, v in attrs if k in ('src', 'href') and v]
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> Path:
+    write_scene(tmp_path / 'data' / 'walk_1', 16, 2)
+    write_scene(tmp_path / 'data' / 'walk_2', 16, 3)
+    return tmp_path / 'data'
+
+
+def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Path, capsys):
+    report = tmp_path / 'report'
+    good = ''.join(f'{20 + 2 * i},50,30,40\n' for i in range(16))
+    (tmp_path / 'walk_1.txt').write_text(good)
+    (tmp_path / 'walk_2.txt').write_text(good)
+    code = main([
+        'evaluate', str(scenes), '--variants', 'kcf', '--boxes', f'peer={tmp_path}', '--jobs', '1',
+        '--short-term', '--report', str(report), '--export', 'vot', '--export', 'princeton',
+    ])  # fmt: skip
+    assert code == 0
+    printed = capsys.readouterr().out
+    assert 'kcf' in printed
+    assert str(report / 'index.html') in printed
+
+    html = (report / 'index.html').read_text()
+    page = Page()
+    page.feed(html)
+    assert page.tables >= 12
+    assert all(link.startswith(('data:', '#')) for link in page.links), 'nothing from outside'
+    assert len(page.images) >= 8
+    numbers = json.loads((report / 'report.json').read_text())
+    with (report / 'tables' / 'overview.csv').open() as file:
+        rows = {row['tracker']: row for row in csv.DictReader(file)}
+    overview = numbers['tables']['overview']
+    for row in overview['rows']:
+        value = row[overview['columns'].index('success %')]
+        assert float(rows[row[0]]['success %']) == pytest.approx(value, rel=1e-5)
+        assert re.search(rf'<td[^>]*>{value:.1f}</td>', html)
+    assert set(numbers['sequences']) == {'walk_1', 'walk_2'}
+    assert numbers['sequences']['walk_1']['scenario'] == 'walk'
+    assert (report / 'submission' / 'vot' / 'kcf' / 'baseline' / 'walk_1').is_dir()
+
+    measured = Measured(
+        read_per_frame(report / 'per_frame.csv'),
+        {n: Info(n, 'walk', 'folder', HIDDEN) for n in ('walk_1', 'walk_2')},
+    )
+    assert cells(tables.overview(measured), 'peer')['success %'] == pytest.approx(
+        float(rows['peer']['success %']), rel=1e-5
+    )
+
+
+def test_the_command_lists_what_failed_and_goes_on(scenes: Path, tmp_path: Path, capsys):
+    truth = scenes / 'walk_1' / 'groundtruth.txt'
+    truth.write_text('1,1,5,5\n')
+    report = tmp_path / 'report'
+    code = main(
+        ['evaluate', str(scenes), '--variants', 'kcf', '--jobs', '1', '--report', str(report)]
+    )
+    assert code == 1
+    error = capsys.readouterr().err
+    assert '1 failed' in error
+    assert f'{truth}, line 1' in error
+    html = (report / 'index.html').read_text()
+    assert 'walk_1' in html
+    assert 'line 1: the file ends here' in html
+    assert 'walk_1' in (report / 'failures.txt').read_text()
+
+
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        (['nowhere'], 'nowhere does not exist'),
+        (['sim:nothing'], "unknown scenario 'nothing'"),
+        (['sim:normal', '--variants', 'deep'], "unknown variant 'deep'"),
+        (['sim:normal', '--param', 'nothing=1'], 'has this parameter'),
+        (['sim:normal', '--variants', 'kcf', '--param', 'metric.x=1'], 'not among the variants'),
+        (['sim:normal', '--jobs', '0'], '--jobs is 0'),
+        (['sim:normal', '--rate', '0'], '--rate is 0 Hz'),
+        (['sim:normal', '--size', 'big'], '--size'),
+        (['sim:normal', '--seeds', 'x'], 'seeds'),
+        (['sim:normal', '--boxes', 'x'], 'NAME=FOLDER'),
+        (['sim:normal', '--variants', 'kcf', '--ablate'], '--ablate'),
+        (['sim:normal', 'sim:normal'], 'two sequences are named normal/1'),
+    ],
+)
+def test_bad_options_are_told_without_a_traceback(words, message, tmp_path: Path, capsys):
+    assert main(['evaluate', *words, '--report', str(tmp_path / 'r')]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert 'Traceback' not in error
+
+
+def test_a_report_folder_that_cannot_be_written(scenes: Path, tmp_path: Path, capsys):
+    (tmp_path / 'file').write_text('')
+    words = ['evaluate', str(scenes), '--variants', 'kcf', '--report', str(tmp_path / 'file')]
+    assert main(words) == 2
+    assert 'cannot be written' in capsys.readouterr().err
