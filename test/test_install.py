@@ -1,0 +1,145 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What users get from ``pip install .`` and from ``colcon build``."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from rgbd_kcf_tracker.recordings import GENERIC, BagWriter
+from rgbd_kcf_tracker.simulation import simulate
+
+ROOT = Path(__file__).resolve().parent.parent
+NAME = 'rgbd_kcf_tracker'
+EXECUTABLES = ('rgbd-kcf', 'replay', 'tracker')
+
+
+def clean_environment() -> dict[str, str]:
+    """The environment without what the ROS wheels or a ROS installation put into it."""
+    environment = dict(os.environ)
+    for name in ('LD_LIBRARY_PATH', '_ROS_WHEELS_BOOTSTRAP_COMPLETE', 'PYTHONPATH',
+                 'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH'):  # fmt: skip
+        environment.pop(name, None)
+    return environment
+
+
+def run(*command: str | Path, cwd: Path, timeout: float = 120) -> str:
+    done = subprocess.run(
+        [str(part) for part in command], cwd=cwd, env=clean_environment(), text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=timeout, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f'{" ".join(map(str, command))}\n{done.stdout}'
+    return done.stdout
+
+
+@pytest.fixture(scope='module')
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what belongs to the package, so that no build leaves traces in the checkout."""
+    copy = tmp_path_factory.mktemp('source') / NAME
+    copy.mkdir()
+    for folder in (NAME, 'config', 'launch', 'resource'):
+        shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns('__pycache__'))
+    for file in ('setup.py', 'setup.cfg', 'pyproject.toml', 'package.xml', 'README.md', 'LICENSE'):
+        shutil.copy(ROOT / file, copy / file)
+    return copy
+
+
+def assert_share_is_complete(share: Path) -> None:
+    assert (share / 'package.xml').is_file()
+    for folder in ('config', 'launch'):
+        wanted = {p.name for p in (ROOT / folder).iterdir() if p.is_file()}
+        assert wanted, f'{folder}/ is empty'
+        assert {p.name for p in (share / folder).iterdir() if p.is_file()} == wanted
+
+
+def test_pip_install(source: Path, tmp_path: Path) -> None:
+    prefix = tmp_path / 'prefix'
+    run(sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-build-isolation',
+        '--prefix', prefix, source, cwd=tmp_path)  # fmt: skip
+    version = f'python{sys.version_info.major}.{sys.version_info.minor}'
+    packages = prefix / 'lib' / version / 'site-packages'
+    assert (packages / NAME / 'py.typed').is_file()
+    for path in (ROOT / NAME).rglob('*.*'):
+        if '__pycache__' in path.parts or path.is_dir():
+            continue
+        assert (packages / path.relative_to(ROOT)).is_file(), f'{path} is not installed'
+    for name in EXECUTABLES:
+        assert os.access(prefix / 'bin' / name, os.X_OK)
+    assert_share_is_complete(prefix / 'share' / NAME)
+    assert (prefix / 'share/ament_index/resource_index/packages' / NAME).is_file()
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+def test_colcon_build(source: Path, tmp_path: Path) -> None:
+    """Built and sourced, the nodes are where ``ros2 run`` looks for them, and they start."""
+    colcon = Path(sys.executable).parent / 'colcon'
+    if not colcon.exists():
+        pytest.skip("needs colcon beside this Python: pip install '.[test]'")
+    run(colcon, '--log-base', tmp_path / 'log', 'build', '--base-paths', source,
+        '--build-base', tmp_path / 'build', '--install-base', tmp_path / 'install',
+        cwd=tmp_path)  # fmt: skip
+    prefix = tmp_path / 'install' / NAME
+    assert_share_is_complete(prefix / 'share' / NAME)
+    for name in EXECUTABLES:
+        assert os.access(prefix / 'lib' / NAME / name, os.X_OK)
+
+    setup = tmp_path / 'install' / 'setup.sh'
+    where = run(
+        'sh', '-c',
+        f'. {setup} && python3 -c "from ament_index_python.packages import '
+        f'get_package_share_directory as find; print(find(\'{NAME}\'))"'.replace(
+            'python3', sys.executable),
+        cwd=tmp_path,
+    )  # fmt: skip
+    assert Path(where.strip()) == prefix / 'share' / NAME
+    run('sh', '-c', f'. {setup} && {prefix}/lib/{NAME}/rgbd-kcf --help', cwd=tmp_path)
+    made = simulate('occlusion', seed=4, size=(160, 120))
+    with BagWriter(tmp_path / 'walk.mcap', GENERIC) as bag:
+        for index in range(20):
+            bag.write_frame(made[index].frame)
+    first = made[0].visible
+    assert first is not None
+    lib = prefix / 'lib' / NAME
+    box = ','.join(f'{v:g}' for v in first.as_tuple())
+    (tmp_path / 'tracker.yaml').write_text(
+        f'/**:\n  ros__parameters:\n    init_box: "{box}"\n    queue_policy: all\n'
+    )
+    tracker = subprocess.Popen(
+        ['sh', '-c', f'. {setup} && exec {lib}/tracker --ros-args --params-file tracker.yaml'],
+        cwd=tmp_path, env=clean_environment(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        text=True,
+    )  # fmt: skip
+    try:
+        said = run(
+            'sh', '-c',
+            f'. {setup} && exec {lib}/replay --ros-args -p bag:=walk.mcap -p lockstep:=true '
+            '-p wait_for_subscribers:=60.0',
+            cwd=tmp_path,
+        )  # fmt: skip
+        assert '20 of 20 answered' in said
+        tracker.terminate()
+        output, _ = tracker.communicate(timeout=10)
+        assert tracker.returncode == 0, output
+        assert 'Traceback' not in output
+    finally:
+        tracker.kill()
+
+
+def test_manifest_and_setup_agree() -> None:
+    manifest = ET.parse(ROOT / 'package.xml').getroot()
+    assert manifest.get('format') == '3'
+    assert manifest.findtext('name') == NAME
+    assert manifest.findtext('export/build_type') == 'ament_python'
+    stated = run(sys.executable, 'setup.py', '--version', cwd=ROOT).split()[-1]
+    assert manifest.findtext('version') == stated
+    assert f'{stated} ' in (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    assert 'Apache License' in (ROOT / 'LICENSE').read_text(encoding='utf-8')[:200]
