@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.trackers.kcf import KcfParameters, KcfTracker
+from rgbd_kcf_tracker.trackers.rgbd import RgbdParameters, RgbdTracker
+from rgbd_kcf_tracker.trackers.rgbd_pf import RgbdPfParameters, RgbdPfTracker
 from rgbd_kcf_tracker.trackers.track import Track, Tracker, TrackState
 
 __all__ = [
@@ -47,6 +49,18 @@ VARIANTS: dict[str, Variant] = {
             KcfParameters,
             KcfTracker,
             uses_depth=False,
+        ),
+        Variant(
+            'rgbd',
+            'kcf with an occlusion test by depth and sliding-window re-detection',
+            RgbdParameters,
+            RgbdTracker,
+        ),
+        Variant(
+            'rgbd_pf',
+            'kcf with a depth-first occlusion test and a particle filter',
+            RgbdPfParameters,
+            RgbdPfTracker,
         ),
     )
 }

@@ -16,6 +16,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
 from rgbd_kcf_tracker.features.window import gray_window
 from rgbd_kcf_tracker.filters.correlation import (
@@ -162,6 +165,12 @@ class KcfModel:
     """What ``kcf`` knows of a target: its window and the filter trained on it.
 
     The other thesis trackers are built on it too. Positions are centres in image pixels.
+
+    Attributes:
+        geometry: sizes of the window.
+        filter: learns with every :meth:`train`.
+        first: what the filter was after the first frame, for comparison with the first template.
+        taper: cosine window over the features.
     """
 
     def __init__(self, width: float, height: float, parameters: KcfParameters) -> None:
@@ -173,23 +182,38 @@ class KcfModel:
             kernel_sigma=parameters.kernel_sigma,
         )
         self._rate = parameters.learning_rate
-        self._taper = cosine_window(self.geometry.cells)
+        self.first = self.filter
+        self.taper = cosine_window(self.geometry.cells)
         self._hog = HogExtractor(self.geometry.window[1], self.geometry.window[0])
 
     def sample(self, frame: Frame, cx: float, cy: float) -> Sample:
         """Windowed features about a centre, ready for the filter (thesis section 2.3.3)."""
         gray = gray_window(frame.color, cx, cy, self.geometry.source, self.geometry.window)
         features = self._hog(gray)
-        features *= self._taper
+        features *= self.taper
         return Sample.of(features)
 
-    def train(self, frame: Frame, cx: float, cy: float) -> None:
-        """Learn the target at a centre; the first time whole, then by interpolation."""
-        self.filter.learn(self.sample(frame, cx, cy), self._rate)
+    def train(self, frame: Frame, cx: float, cy: float, trust: float = 1.0) -> None:
+        """Learn the target at a centre; the first time whole, then by interpolation.
+
+        Args:
+            frame: where the target is seen.
+            cx: column of its centre.
+            cy: row of its centre.
+            trust: share of the learning rate, 0 to 1.
+        """
+        fresh = not self.filter.trained
+        self.filter.learn(self.sample(frame, cx, cy), self._rate * trust)
+        if fresh:
+            self.first = self.filter.copy()
 
     def detect(self, frame: Frame, cx: float, cy: float) -> Detection:
         """Look about a centre (thesis section 2.3.4)."""
-        found = peak(self.filter.respond(self.sample(frame, cx, cy)))
+        return self.place(self.filter.respond(self.sample(frame, cx, cy)), cx, cy)
+
+    def place(self, response: npt.NDArray[np.float64], cx: float, cy: float) -> Detection:
+        """Where in the image the peak of a response about ``cx, cy`` lies."""
+        found = peak(response)
         across, down = self.geometry.cell
         return Detection(
             cx=cx + found.col * across,

@@ -1,0 +1,148 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The self-adjusting depth patch: has the depth at the target's centre changed?
+
+Thesis section 4.1.3. Centre patches of two frames are subtracted. Where the target's silhouette has
+shifted, background enters at an edge of the patch: edge columns and rows of high difference are
+trimmed away, up to a bound. An occluder covers more than the bound allows, so what is left still
+differs, and that is what decides (figures 4.3 to 4.5).
+
+Three things the thesis leaves open are decided here. A pixel without a reading in either patch
+never counts. The patch is compared with the last one that surely showed the target, not with the
+frame before: an occluder that slides in slowly changes little from frame to frame, and one that
+stands still changes nothing. And a target may walk towards the camera: the shift that all pixels share is
+taken for its motion, as far as a walking person can have come in the time between two frames.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.features.depth_patch import Depth
+
+
+@dataclass(frozen=True, slots=True)
+class DepthDifference:
+    """What the comparison of two centre patches says.
+
+    Attributes:
+        nearer: the thesis's D_diff: by how many metres the pixels that are left came nearer, on
+            average; None where too few have a reading in both patches.
+        farther: share of the pixels that show something farther than the target; None likewise.
+        motion: shift in metres that was taken for the target's own motion.
+        rows, cols: what the trimming left of the patch.
+    """
+
+    nearer: float | None
+    farther: float | None
+    motion: float
+    rows: slice
+    cols: slice
+
+
+def trim(high: npt.NDArray[np.bool_], bound: int) -> slice:
+    """What is left of an axis whose edge entries are high.
+
+    Args:
+        high: which columns (or rows) have a high difference.
+        bound: most entries to take off at either end.
+    """
+    before = after = 0
+    while before < bound and high[before]:
+        before += 1
+    while after < bound and high[-1 - after]:
+        after += 1
+    return slice(before, len(high) - after)
+
+
+class DepthPatch:
+    """Remembers the depth patch of a target that was seen, and compares others with it.
+
+    Args:
+        trim_above: metres; an edge column or row that differs by more on average is trimmed.
+        most_trim: share of the patch that may be trimmed at each edge, below 0.5.
+        walking_speed: metres per second that a target may come nearer or go away.
+        cap: metres that one pixel can differ at most.
+        least_valid: share of the patch that must have a reading in both patches.
+    """
+
+    def __init__(
+        self,
+        trim_above: float,
+        most_trim: float,
+        walking_speed: float,
+        cap: float,
+        least_valid: float = 0.1,
+    ) -> None:
+        self._cap = np.float32(cap)
+        self._trim_above = trim_above
+        self._most_trim = most_trim
+        self._speed = walking_speed
+        self._least_valid = least_valid
+        self._patch: Depth | None = None
+        self._depth: float | None = None
+
+    @property
+    def depth(self) -> float | None:
+        """Distance of the target in metres when it was last followed; None where unknown."""
+        return self._depth
+
+    def remember(self, patch: Depth) -> None:
+        """Take the patch of a target that is surely seen."""
+        valid = np.isfinite(patch)
+        if np.mean(valid) < self._least_valid:
+            return
+        self._depth = float(np.median(patch[valid]))
+        # What lies outside the image is the target's too: if it comes in, it comes at this depth.
+        self._patch = np.where(np.isinf(patch), np.float32(self._depth), patch)
+
+    def follow(self, difference: DepthDifference) -> None:
+        """Let the remembered depth go with the target's own motion."""
+        if self._patch is not None and self._depth is not None:
+            self._patch = self._patch + np.float32(difference.motion)
+            self._depth += difference.motion
+
+    def diff_at_centre(self, patch: Depth, interval: float) -> DepthDifference:
+        """Compare a patch with the remembered one (the thesis's ``diff_at_centre``).
+
+        Args:
+            patch: from :func:`~rgbd_kcf_tracker.features.depth_patch.centre_patch`, metres.
+            interval: seconds in which the target may have moved by itself.
+        """
+        rows, cols = slice(0, patch.shape[0]), slice(0, patch.shape[1])
+        if self._patch is None:
+            return DepthDifference(None, None, 0.0, rows, cols)
+        change = patch - self._patch
+        valid = ~np.isnan(change)
+        least = self._least_valid * change.size
+        if np.count_nonzero(valid) < least:
+            return DepthDifference(None, None, 0.0, rows, cols)
+        reach = self._speed * interval
+        motion = float(np.clip(np.median(change[valid]), -reach, reach))
+        change = np.where(valid, change - np.float32(motion), 0)
+        # One pixel counts for so much and no more: what decides is how many there are.
+        change = np.clip(change, -self._cap, self._cap)
+        size = np.abs(change)
+        # Columns first, then rows of what is left: the figures' order.
+        bounds = [int(self._most_trim * side) for side in size.shape]
+        cols = trim(self._high(size, valid, 0), bounds[1])
+        rows = trim(self._high(size[:, cols], valid[:, cols], 1), bounds[0])
+        count = np.count_nonzero(valid[rows, cols])
+        if count < least / 2:
+            return DepthDifference(None, None, motion, rows, cols)
+        left = change[rows, cols]
+        nearer = float(-np.minimum(left, 0).sum() / count)
+        farther = np.count_nonzero(left > self._trim_above) / count
+        return DepthDifference(nearer, farther, motion, rows, cols)
+
+    def _high(
+        self, size: npt.NDArray[np.float32], valid: npt.NDArray[np.bool_], axis: int
+    ) -> npt.NDArray[np.bool_]:
+        counts = np.count_nonzero(valid, axis=axis)
+        means = size.sum(axis=axis) / np.maximum(counts, 1)
+        high: npt.NDArray[np.bool_] = means > self._trim_above
+        return high

@@ -1,0 +1,244 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""KCF with a depth-first occlusion test and a particle filter (thesis chapter 5).
+
+Algorithm 2: the depth at the target's centre is looked at first. While it is the target's,
+particles with a colour likelihood and the correlation filter locate it together; once it is not,
+there is no box, nothing is learned, and the particles carry on with the target's velocity until the
+filter responds at one of the places that they suggest. ``docs/thesis.md`` maps the algorithm's
+steps to the methods below and says what was decided where the thesis is silent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgbd_kcf_tracker.features.color_histogram import ColorHistogram, bhattacharyya_distance
+from rgbd_kcf_tracker.filters.particle_filter import (
+    HEIGHT,
+    WIDTH,
+    ParticleFilter,
+    ProcessNoise,
+    X,
+    Y,
+    normal_likelihood,
+)
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.parameters import parameter
+from rgbd_kcf_tracker.trackers.depth_aware import DepthAwareTracker, DepthParameters
+from rgbd_kcf_tracker.trackers.kcf import Detection, KcfModel
+
+_THESIS = 'thesis Algorithm 2'
+
+# A region that looks nothing like the target says nothing of where a hidden one is: likelihoods do
+# not fall below that of this colour distance.
+_UNLIKE = 0.7
+# Share of the particles thrown anywhere in each frame while the target is lost.
+_SCATTER = 0.5
+# Seconds of walking by which a target found again may have changed its depth unseen.
+_UNSEEN_S = 0.5
+
+
+@dataclass(frozen=True)
+class RgbdPfParameters(DepthParameters):
+    """Parameters of the ``rgbd_pf`` variant."""
+
+    accept_threshold: float = parameter(
+        0.6,
+        "Response at the particles' estimate above which it is the target's position.",
+        minimum=0.0,
+        maximum=1.0,
+        source=_THESIS,
+    )
+    hold_threshold: float = parameter(
+        0.3,
+        'Response below which the position of the last frame is held.',
+        minimum=0.0,
+        maximum=1.0,
+        source=_THESIS,
+    )
+    particles: int = parameter(200, 'Number of particles.', minimum=10, maximum=20000)
+    color_bins: int = parameter(
+        8, 'Bins per colour channel of the histogram.', minimum=2, maximum=32
+    )
+    color_sigma: float = parameter(
+        0.2,
+        'Standard deviation of the colour distance in the likelihood.',
+        minimum=0.01,
+        maximum=2.0,
+    )
+    position_noise: float = parameter(
+        0.3,
+        'Random walk of the position, in target widths.',
+        unit='1/sqrt(s)',
+        minimum=0.0,
+        maximum=20.0,
+    )
+    velocity_noise: float = parameter(
+        2.0,
+        'Random walk of the velocity, in target widths per second.',
+        unit='1/s/sqrt(s)',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    size_noise: float = parameter(
+        0.05,
+        'Random walk of width and height, in target widths.',
+        unit='1/sqrt(s)',
+        minimum=0.0,
+        maximum=5.0,
+    )
+    scale_noise: float = parameter(
+        0.05,
+        'Random walk of the scale rate alpha.',
+        unit='1/s/sqrt(s)',
+        minimum=0.0,
+        maximum=5.0,
+    )
+    resample_below: float = parameter(
+        0.5,
+        'Resample when the effective sample size is below this share of the particles.',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    seed: int = parameter(0, 'Seed of everything random.', minimum=0, maximum=2**31 - 1)
+
+
+class RgbdPfTracker(DepthAwareTracker):
+    """Algorithm 2 of the thesis."""
+
+    def __init__(self, parameters: RgbdPfParameters) -> None:
+        super().__init__(parameters, parameters.hold_threshold, parameters.accept_threshold)
+        self._parameters = parameters
+        self._histogram = ColorHistogram(parameters.color_bins)
+
+    def _begin(self, frame: Frame) -> None:
+        p, box = self._parameters, self._box
+        noise = ProcessNoise(
+            position=p.position_noise * box.width,
+            velocity=p.velocity_noise * box.width,
+            size=p.size_noise * box.width,
+            alpha=p.scale_noise,
+        )
+        self._particles = ParticleFilter(p.particles, noise, np.random.default_rng(p.seed))
+        self._initiate_particles(box)
+        self._target_colors = self._histogram(frame.color, np.array([box.as_tuple()]))[0]
+
+    def _follow(self, frame: Frame, model: KcfModel, interval: float) -> Detection | None:
+        """Steps 6 to 21 of Algorithm 2; :meth:`_see` is step 4 for the next frame."""
+        self._particles.predict(interval)
+        if self._hidden:
+            return self._look_for_hidden(frame, model)
+        last = self._box
+        here = model.detect(frame, last.cx, last.cy)
+        difference = self._diff_at_centre(frame, self._box_at(here), interval)
+        if self._occlusion_status(difference, here.response):
+            # Step 19: the position is kept, nothing is learned, and no box is drawn.
+            self._hidden = True
+            return None
+        estimate = self._estimate(frame)
+        there = self._detect_at(frame, model, [estimate])
+        found = self._decide(here, there, Detection(last.cx, last.cy, last.cx, last.cy, 0.0))
+        if found is not here:
+            difference = self._diff_at_centre(frame, self._box_at(found), interval)
+        self._see(frame, model, found, difference)
+        self._observe(found)
+        return found
+
+    def _decide(self, here: Detection, there: Detection, last: Detection) -> Detection:
+        """Steps 13 to 16: which position the responses speak for.
+
+        Args:
+            here: found about the last position (pos'_i).
+            there: found about the particles' estimate (pos'_pf).
+            last: the last position itself (pos_{i-1}).
+        """
+        p = self._parameters
+        if there.response > p.accept_threshold and there.response >= here.response:
+            return there
+        if max(here.response, there.response) >= p.hold_threshold:
+            return here
+        self._initiate_particles(self._box)
+        return last
+
+    def _estimate(self, frame: Frame) -> tuple[float, float]:
+        """Steps 10 and 11: weigh the particles by colour; the centre of their mean."""
+        self._weigh(frame)
+        mean = self._particles.estimate()
+        self._particles.resample(self._parameters.resample_below)
+        return float(mean[X] + mean[WIDTH] / 2), float(mean[Y] + mean[HEIGHT] / 2)
+
+    def _weigh(self, frame: Frame) -> None:
+        """Likelihood of each particle by the colours of its region."""
+        sigma = self._parameters.color_sigma
+        regions = self._particles.states[:, [X, Y, WIDTH, HEIGHT]]
+        colors = self._histogram(frame.color, regions)
+        distance = bhattacharyya_distance(colors, self._target_colors)
+        self._particles.update(normal_likelihood(np.minimum(distance, _UNLIKE), sigma))
+
+    def _observe(self, found: Detection) -> None:
+        """Weigh the particles by the position found, so that they learn the target's velocity."""
+        states = self._particles.states
+        distance = np.hypot(
+            states[:, X] + states[:, WIDTH] / 2 - found.cx,
+            states[:, Y] + states[:, HEIGHT] / 2 - found.cy,
+        )
+        self._particles.update(normal_likelihood(distance, self._box.width * 0.15))
+        self._particles.resample(self._parameters.resample_below)
+
+    def _look_for_hidden(self, frame: Frame, model: KcfModel) -> Detection | None:
+        """Steps 10 to 19 while the target is hidden.
+
+        The filter looks at the particles' estimate, at the likeliest particle and at the position
+        that was kept. What it finds is the target if the depth there is the target's.
+        """
+        lost = self._hidden_s() > self._depth_parameters.lost_after
+        if lost:
+            self._particles.scatter(self._box, self._image_size, _SCATTER)
+        self._weigh(frame)
+        weights, states = self._particles.weights, self._particles.states
+        heaviest = states[int(np.argmax(weights))]
+        places = [
+            (state[X] + state[WIDTH] / 2, state[Y] + state[HEIGHT] / 2)
+            for state in (self._particles.estimate(), heaviest)
+        ]
+        self._particles.resample(self._parameters.resample_below)
+        here = self._detect_at(frame, model, [(self._box.cx, self._box.cy)])
+        if here.response > self._low and not self._occlusion_status(
+            self._diff_at_centre(frame, self._box_at(here), 0.0), here.response
+        ):
+            return self._found_again(frame, model, here)
+        there = self._detect_at(frame, model, places)
+        if there.response > self._high and not self._occlusion_status(
+            self._diff_at_centre(frame, self._box_at(there), _UNSEEN_S), there.response
+        ):
+            return self._found_again(frame, model, there)
+        return None
+
+    def _found_again(self, frame: Frame, model: KcfModel, found: Detection) -> Detection:
+        self._see(frame, model, found, None)
+        self._initiate_particles(self._box)
+        return found
+
+    def _detect_at(
+        self, frame: Frame, model: KcfModel, places: list[tuple[float, float]]
+    ) -> Detection:
+        """Step 12: the best that the filter or the first template finds about some centres."""
+        best: Detection | None = None
+        for cx, cy in places:
+            sample = model.sample(frame, cx, cy)
+            response = np.maximum(model.filter.respond(sample), model.first.respond(sample))
+            found = model.place(response, cx, cy)
+            if best is None or found.response > best.response:
+                best = found
+        assert best is not None
+        return best
+
+    def _initiate_particles(self, box: Box) -> None:
+        """Step 10: particles about a position, in any direction at a walk."""
+        p = self._parameters
+        self._particles.initialise(box, 0.1 * box.width, p.velocity_noise * box.width / 2)
