@@ -16,6 +16,8 @@ from rgbd_kcf_tracker.recordings.sqlite_pages import is_cut_off, whole_rows
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 
 MAGIC = b'SQLite format 3\0'
+# A damaged file has text that is no UTF-8, and numbers that are none, too.
+_ERRORS = (sqlite3.Error, UnicodeError, ValueError, OverflowError)
 
 
 class SqliteStorage:
@@ -51,7 +53,7 @@ class SqliteStorage:
                 database = sqlite3.connect(f'file:{name}?{mode}', uri=True)
                 database.execute('SELECT count(*) FROM sqlite_master').fetchone()
                 return database
-            except sqlite3.Error as error:
+            except _ERRORS as error:
                 reason = error
         raise RecordingError(f'{self.path} cannot be read: {reason}')
 
@@ -61,19 +63,21 @@ class SqliteStorage:
             rows = self._database.execute('SELECT id, name, type, serialization_format FROM topics')
             names: dict[int, tuple[str, str]] = {}
             for number, name, kind, form in rows:
+                if not (isinstance(name, str) and isinstance(kind, str)):
+                    continue
                 if form != 'cdr':
                     self.warnings.append(f'{self.path}: topic {name} is in {form!r}: left out')
                     continue
                 names[number] = (name, kind)
                 self.topics[name] = kind
-        except sqlite3.Error as error:
+        except _ERRORS as error:
             raise RecordingError(f'{self.path} is no rosbag2 database: {error}') from None
         self._read_definitions()
         try:
             for number, topic, log_ns, length, data in self._rows():
-                if topic in names and isinstance(data, bytes):
+                if topic in names and isinstance(data, bytes) and isinstance(log_ns, int):
                     yield Scanned(*names[topic], log_ns, data, (-1, number, length))
-        except sqlite3.Error as error:
+        except _ERRORS as error:
             self.warnings.append(
                 f'{self.path} is damaged or was cut off ({error}): '
                 'the messages before that place are read'
@@ -86,17 +90,17 @@ class SqliteStorage:
             return
         self.warnings.append(f'{self.path} was cut off: all whole messages in it are read')
         query = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
-        (root,) = self._database.execute(query).fetchone()
-        for number in whole_rows(self.path, int(root)):
+        root = self._database.execute(query).fetchone()
+        for number in whole_rows(self.path, int(root[0]) if root else 0):
             yield from self._database.execute(f'{columns} FROM messages WHERE id = ?', (number,))
 
     def _read_definitions(self) -> None:
         query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
         try:
             for kind, encoding, text in self._database.execute(query):
-                if text:
+                if isinstance(text, str) and isinstance(encoding, str) and text:
                     self.definitions[kind] = Definition(encoding, text)
-        except sqlite3.Error:
+        except _ERRORS:
             return  # the table is there from Iron on
 
     def read(self, where: Where) -> bytes:
@@ -105,9 +109,9 @@ class SqliteStorage:
             row = self._database.execute(
                 'SELECT data FROM messages WHERE id = ?', (where[1],)
             ).fetchone()
-        except sqlite3.Error as error:
+        except _ERRORS as error:
             raise RecordingError(f'{self.path} cannot be read on: {error}') from None
-        if row is None:
+        if row is None or not isinstance(row[0], bytes):
             raise RecordingError(f'{self.path} changed while it was read')
         return bytes(row[0])
 
