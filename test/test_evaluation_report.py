@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.evaluation import strips, tables, thesis, thesis_tables
@@ -321,6 +322,7 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
         value = row[overview['columns'].index('success %')]
         assert float(rows[row[0]]['success %']) == pytest.approx(value, rel=1e-5)
         assert re.search(rf'<td[^>]*>{value:.1f}</td>', html)
+    assert '| kcf |' in (report / 'tables.md').read_text()
     assert set(numbers['sequences']) == {'walk_1', 'walk_2'}
     assert numbers['sequences']['walk_1']['scenario'] == 'walk'
     assert (report / 'submission' / 'vot' / 'kcf' / 'baseline' / 'walk_1').is_dir()
@@ -332,6 +334,27 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
     assert cells(tables.overview(measured), 'peer')['success %'] == pytest.approx(
         float(rows['peer']['success %']), rel=1e-5
     )
+
+
+def test_princetons_test_set_is_run_and_written_but_not_measured(tmp_path: Path, capsys):
+    path = tmp_path / 'data' / 'cafe_occ1'
+    for folder, letter in (('rgb', 'r'), ('depth', 'd')):
+        (path / folder).mkdir(parents=True)
+        for i in range(3):
+            image = np.full((60, 80), 8000 + 100 * i, np.uint16)
+            if letter == 'r':
+                image = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
+            cv2.imwrite(str(path / folder / f'{letter}-{i}-{i}.png'), image)
+    numbers = {f'{k}{w}': [0, 1, 2] for k in ('image', 'depth') for w in ('Timestamp', 'FrameID')}
+    savemat(path / 'frames.mat', {'frames': {'length': 3, **numbers}})
+    (path / 'init.txt').write_text('20,10,20,30\n')
+    report = tmp_path / 'report'
+    words = ['evaluate', str(tmp_path / 'data'), '--variants', 'kcf', '--jobs', '1']
+    assert main([*words, '--report', str(report), '--export', 'princeton']) == 0
+    assert 'none has ground truth' in capsys.readouterr().out
+    lines = (report / 'submission' / 'princeton' / 'kcf' / 'cafe_occ1.txt').read_text().splitlines()
+    assert lines[0] == '20.000,10.000,40.000,40.000,0'
+    assert len(lines) == 3
 
 
 def test_the_command_lists_what_failed_and_goes_on(scenes: Path, tmp_path: Path, capsys):

@@ -155,6 +155,7 @@ def test_a_run_leaves_tracks_and_is_not_made_twice(tmp_path: Path):
         {'contender': Contender('kcf', 'variant', 'kcf', (('padding', '2.0'),))},
         {'options': RunOptions(use_depth=False)},
         {'options': RunOptions(rate_hz=5.0)},
+        {'options': RunOptions(code='another version')},
     ],
 )
 def test_a_run_is_made_again_when_anything_that_decides_it_changes(tmp_path: Path, change):

@@ -9,7 +9,7 @@ import hashlib
 import json
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,18 @@ from rgbd_kcf_tracker.evaluation.store import (
 _CODE = ('geometry.py', 'frame.py', 'features', 'filters', 'trackers', 'simulation', 'recordings')
 
 
+@cache
+def code_digest() -> str:
+    """Version and digest of the code that makes frames and tracks."""
+    root = Path(rgbd_kcf_tracker.__file__).parent
+    digest = hashlib.sha256(rgbd_kcf_tracker.__version__.encode())
+    for name in _CODE:
+        place = root / name
+        for path in [place] if place.is_file() else sorted(place.rglob('*.py')):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 @dataclass(frozen=True, slots=True)
 class RunOptions:
     """How sequences are run.
@@ -48,6 +60,7 @@ class RunOptions:
         short_term: also run VOT's protocol with re-initialisation.
         jobs: parallel processes.
         fresh: run again what is already there.
+        code: digest of the code; part of every run's key, the same in all processes of a run.
     """
 
     rate_hz: float | None = None
@@ -55,6 +68,7 @@ class RunOptions:
     short_term: bool = False
     jobs: int = 1
     fresh: bool = False
+    code: str = field(default_factory=code_digest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +115,7 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
         except RgbdKcfError:
             extra = 'missing'
     parts = [
-        sequence.identity, contender.identity, extra, code_digest(),
+        sequence.identity, contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
@@ -117,18 +131,6 @@ def is_done(folder: Path, sequence: Sequence, contender: Contender, options: Run
     except (OSError, ValueError):
         return False
     return bool(meta.get('key') == run_key(sequence, contender, options))
-
-
-@cache
-def code_digest() -> str:
-    """Version and digest of the code that makes frames and tracks."""
-    root = Path(rgbd_kcf_tracker.__file__).parent
-    digest = hashlib.sha256(rgbd_kcf_tracker.__version__.encode())
-    for name in _CODE:
-        place = root / name
-        for path in [place] if place.is_file() else sorted(place.rglob('*.py')):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def run_job(job: Job) -> list[Failure]:

@@ -81,6 +81,9 @@ def write_report(
     every = _all_tables(content)
     for table in every:
         write_atomically(folder / 'tables' / f'{slug(table.key)}.csv', table.csv())
+    write_atomically(
+        folder / 'tables.md', '\n'.join(f'### {t.title}\n\n{t.markdown()}\n' for t in every)
+    )
     numbers = _numbers(measured, every, curves, contenders, failures, heading)
     write_json(folder / 'report.json', numbers, indent=1)
 
