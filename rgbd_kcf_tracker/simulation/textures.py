@@ -114,6 +114,17 @@ CLOTH_KINDS = (
 )  # fmt: skip
 
 
+def _print_letters(
+    image: npt.NDArray[np.float32], letters: str, at: tuple[int, int], scale: float, color: Color,
+    thickness: int,
+) -> None:  # fmt: skip
+    """Print on a float image; OpenCV 5 draws letters on 8-bit images alone."""
+    mask = np.zeros(image.shape[:2], np.uint8)
+    cv2.putText(mask, letters, at, cv2.FONT_HERSHEY_DUPLEX, scale, 255, thickness, cv2.LINE_AA)
+    cover = mask[..., None].astype(np.float32) / 255
+    image += cover * (np.float32(color) - image)
+
+
 def _print_logo(
     rng: np.random.Generator, image: npt.NDArray[np.float32], first: Color, second: Color
 ) -> None:
@@ -136,10 +147,7 @@ def _print_logo(
             )
             scale = r / 14
             width = cv2.getTextSize(letters, cv2.FONT_HERSHEY_DUPLEX, scale, 3)[0][0]
-            cv2.putText(
-                patch, letters, (x - width // 2, y + r), cv2.FONT_HERSHEY_DUPLEX, scale, first, 3,
-                cv2.LINE_AA,
-            )  # fmt: skip
+            _print_letters(patch, letters, (x - width // 2, y + r), scale, first, 3)
         else:
             star = [
                 (x + r * f * np.sin(a), y - r * f * np.cos(a))
@@ -294,8 +302,7 @@ def cardboard(rng: np.random.Generator, h: int, w: int) -> Texture:
     if rng.uniform() < 0.7:
         x, y = int(w * rng.uniform(0.05, 0.5)), int(h * rng.uniform(0.1, 0.6))
         cv2.rectangle(image, (x, y), (x + w // 3, y + h // 5), (60, 60, 70), 3)
-        cv2.putText(image, 'FRAGILE', (x + 4, y + h // 7), cv2.FONT_HERSHEY_DUPLEX, w / 400,
-                    (50, 50, 60), 2)  # fmt: skip
+        _print_letters(image, 'FRAGILE', (x + 4, y + h // 7), w / 400, (50, 50, 60), 2)
     return _shaded(rng, image, broad=0.06, grain=0.03)
 
 
