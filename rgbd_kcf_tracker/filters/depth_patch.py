@@ -11,8 +11,9 @@ differs, and that is what decides (figures 4.3 to 4.5).
 Three things the thesis leaves open are decided here. A pixel without a reading in either patch
 never counts. The patch is compared with the last one that surely showed the target, not with the
 frame before: an occluder that slides in slowly changes little from frame to frame, and one that
-stands still changes nothing. And a target may walk towards the camera: the shift that all pixels share is
-taken for its motion, as far as a walking person can have come in the time between two frames.
+stands still changes nothing. And a target may walk towards the camera: the shift that all pixels
+share is taken for its motion, as far as a walking person can have come in the time between two
+frames.
 """
 
 from __future__ import annotations
@@ -30,15 +31,18 @@ class DepthDifference:
     """What the comparison of two centre patches says.
 
     Attributes:
-        nearer: the thesis's D_diff: by how many metres the pixels that are left came nearer, on
-            average; None where too few have a reading in both patches.
-        farther: share of the pixels that show something farther than the target; None likewise.
+        value: the thesis's D_diff: mean absolute difference of the pixels that are left, in metres.
+        nearer: the part of it that came nearer, in metres: what an occluder does.
+        farther: share of the pixels that show something farther than the target.
+        distance: median depth of the new patch in metres.
         motion: shift in metres that was taken for the target's own motion.
         rows, cols: what the trimming left of the patch.
     """
 
-    nearer: float | None
-    farther: float | None
+    value: float
+    nearer: float
+    farther: float
+    distance: float
     motion: float
     rows: slice
     cols: slice
@@ -106,21 +110,23 @@ class DepthPatch:
             self._patch = self._patch + np.float32(difference.motion)
             self._depth += difference.motion
 
-    def diff_at_centre(self, patch: Depth, interval: float) -> DepthDifference:
+    def diff_at_centre(self, patch: Depth, interval: float) -> DepthDifference | None:
         """Compare a patch with the remembered one (the thesis's ``diff_at_centre``).
 
         Args:
             patch: from :func:`~rgbd_kcf_tracker.features.depth_patch.centre_patch`, metres.
             interval: seconds in which the target may have moved by itself.
+
+        Returns:
+            None where too few pixels have a reading in both patches.
         """
-        rows, cols = slice(0, patch.shape[0]), slice(0, patch.shape[1])
         if self._patch is None:
-            return DepthDifference(None, None, 0.0, rows, cols)
+            return None
         change = patch - self._patch
         valid = ~np.isnan(change)
         least = self._least_valid * change.size
         if np.count_nonzero(valid) < least:
-            return DepthDifference(None, None, 0.0, rows, cols)
+            return None
         reach = self._speed * interval
         motion = float(np.clip(np.median(change[valid]), -reach, reach))
         change = np.where(valid, change - np.float32(motion), 0)
@@ -133,11 +139,17 @@ class DepthPatch:
         rows = trim(self._high(size[:, cols], valid[:, cols], 1), bounds[0])
         count = np.count_nonzero(valid[rows, cols])
         if count < least / 2:
-            return DepthDifference(None, None, motion, rows, cols)
+            return None
         left = change[rows, cols]
-        nearer = float(-np.minimum(left, 0).sum() / count)
-        farther = np.count_nonzero(left > self._trim_above) / count
-        return DepthDifference(nearer, farther, motion, rows, cols)
+        return DepthDifference(
+            value=float(np.abs(left).sum() / count),
+            nearer=float(-np.minimum(left, 0).sum() / count),
+            farther=np.count_nonzero(left > self._trim_above) / count,
+            distance=float(np.median(patch[valid])),
+            motion=motion,
+            rows=rows,
+            cols=cols,
+        )
 
     def _high(
         self, size: npt.NDArray[np.float32], valid: npt.NDArray[np.bool_], axis: int

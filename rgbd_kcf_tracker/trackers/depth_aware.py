@@ -64,6 +64,12 @@ class DepthParameters(KcfParameters):
         minimum=0.0,
         maximum=1.0,
     )
+    depth_change: float = parameter(
+        0.35,
+        'Share by which the distance of a target found again may differ from the last one.',
+        minimum=0.0,
+        maximum=10.0,
+    )
     walking_speed: float = parameter(
         2.0,
         'Speed at which a target may come nearer or go away without counting as hidden.',
@@ -147,19 +153,34 @@ class DepthAwareTracker(ABC):
         if frame.depth is None:
             return None
         patch = centre_patch(frame.depth, box, self._depth_parameters.center_share)
-        difference = self._depth_patch.diff_at_centre(patch, interval)
-        return None if difference.nearer is None else difference
+        return self._depth_patch.diff_at_centre(patch, interval)
 
     def _occlusion_status(self, difference: DepthDifference | None, response: float) -> bool:
-        """Whether the target is hidden: something nearer covers it, or nothing is there any more.
+        """Whether the target is hidden.
 
-        Where depth says nothing the response is all there is: a target that was seen is hidden when
+        A target that was seen is hidden when something nearer covers it, or when nothing is there
+        any more; background that only entered the patch at a side hides nothing. A target that was
+        hidden is seen again when the depth is its own, without difference to either side. Where
+        depth says nothing the response is all there is: a target that was seen is hidden when
         the response falls to what the thesis measured of full occlusion (figure 4.11).
         """
         p = self._depth_parameters
-        if difference is None or difference.nearer is None or difference.farther is None:
+        if difference is None:
             return self._hidden or response < self._low
+        if self._hidden:
+            return difference.value >= p.depth_threshold
         return difference.farther > p.gone_share or difference.nearer >= p.depth_threshold
+
+    def _plausible(self, frame: Frame, found: Detection) -> bool:
+        """Whether what responds could be the target found again, by its depth.
+
+        The template has one size, so what looks like it at another distance is not the target.
+        """
+        difference = self._diff_at_centre(frame, self._box_at(found), 0.0)
+        depth = self._depth_patch.depth
+        if difference is None or depth is None:
+            return True
+        return abs(difference.distance / depth - 1) <= self._depth_parameters.depth_change
 
     def _see(
         self,
@@ -188,7 +209,7 @@ class DepthAwareTracker(ABC):
 
     def _trust(self, difference: DepthDifference | None, response: float) -> float:
         """How much of a frame to learn: less, the more the depth, or else the response, differs."""
-        if difference is None or difference.nearer is None or difference.farther is None:
+        if difference is None:
             return min(max((response - self._low) / (self._high - self._low), 0.0), 1.0)
         p = self._depth_parameters
         near = min(difference.nearer / p.depth_threshold, 1.0)

@@ -88,7 +88,9 @@ class RgbdTracker(DepthAwareTracker):
     def _follow(self, frame: Frame, model: KcfModel, interval: float) -> Detection | None:
         """Steps 5 to 17 of Algorithm 1; :meth:`_see` is steps 3 and 4 for the next frame."""
         best, here = self._search(frame, model)
-        if best.response > self._parameters.detect_threshold:
+        if best.response > self._parameters.detect_threshold and (
+            not self._hidden or self._plausible(frame, best)
+        ):
             return self._detected(frame, model, best, interval)
         # Hidden, the target is where it was left: only what is there tells that it is free again.
         reach = 0.0 if self._hidden else interval

@@ -207,17 +207,14 @@ class RgbdPfTracker(DepthAwareTracker):
             for state in (self._particles.estimate(), heaviest)
         ]
         self._particles.resample(self._parameters.resample_below)
-        here = self._detect_at(frame, model, [(self._box.cx, self._box.cy)])
-        if here.response > self._low and not self._occlusion_status(
-            self._diff_at_centre(frame, self._box_at(here), 0.0), here.response
-        ):
-            return self._found_again(frame, model, here)
-        there = self._detect_at(frame, model, places)
-        if there.response > self._high and not self._occlusion_status(
-            self._diff_at_centre(frame, self._box_at(there), _UNSEEN_S), there.response
-        ):
-            return self._found_again(frame, model, there)
-        return None
+        places.append((self._box.cx, self._box.cy))
+        found = self._detect_at(frame, model, places)
+        if found.response < self._low or not self._plausible(frame, found):
+            return None
+        difference = self._diff_at_centre(frame, self._box_at(found), _UNSEEN_S)
+        if found.response < self._high and self._occlusion_status(difference, found.response):
+            return None
+        return self._found_again(frame, model, found)
 
     def _found_again(self, frame: Frame, model: KcfModel, found: Detection) -> Detection:
         self._see(frame, model, found, None)
