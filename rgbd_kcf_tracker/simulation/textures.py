@@ -122,7 +122,7 @@ def _print_letters(
     mask = np.zeros(image.shape[:2], np.uint8)
     cv2.putText(mask, letters, at, cv2.FONT_HERSHEY_DUPLEX, scale, 255, thickness, cv2.LINE_AA)
     cover = mask[..., None].astype(np.float32) / 255
-    image += cover * (np.float32(color) - image)
+    image += cover * (np.asarray(color, np.float32) - image)
 
 
 def _print_logo(
