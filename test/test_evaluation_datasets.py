@@ -15,12 +15,18 @@ from scipy.io import savemat
 
 from rgbd_kcf_tracker.errors import DatasetError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
-from rgbd_kcf_tracker.evaluation.datasets.base import Sample, at_rate, from_first_box, without_depth
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    Sample,
+    at_rate,
+    from_first_view,
+    without_depth,
+)
 from rgbd_kcf_tracker.evaluation.datasets.images import unrotate
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter
 
 WIDTH, HEIGHT = 64, 48
 
@@ -307,7 +313,7 @@ def test_our_layout_with_an_image_that_is_none(own: Path):
 
 def test_our_layout_without_truth_or_target(own: Path):
     (own / 'groundtruth.txt').write_text('nan,nan,nan,nan\n' * 4)
-    assert 'never seen' in error_of(own)
+    assert 'never clearly in view' in error_of(own)
     (own / 'groundtruth.txt').unlink()
     assert 'has no groundtruth.txt' in error_of(own)
 
@@ -401,7 +407,31 @@ def test_thinning_out_keeps_the_asked_rate():
 def test_dropping_depth_and_starting_at_the_first_box():
     samples = [sample(0), sample(1, Box(0, 0, 2, 2)), sample(2)]
     assert all(s.frame.depth is None for s in without_depth(samples))
-    assert [s.frame.stamp_ns for s in from_first_box(samples)] == [1_000_000, 2_000_000]
+    assert [s.frame.stamp_ns for s in from_first_view(samples)] == [1_000_000, 2_000_000]
+
+
+def test_a_scene_measures_the_same_as_bag_and_as_folder(tmp_path: Path):
+    options = DatasetOptions(duration_s=0.5, size=(160, 90))
+    (scene,) = open_dataset('sim:normal:4', options)
+    bag, folder = tmp_path / 'normal_4.mcap', tmp_path / 'folders' / 'normal_4'
+    with BagWriter(bag) as writer, SequenceWriter(folder) as images:
+        for s in scene.open().samples:
+            writer.write_frame(s.frame)
+            writer.write_truth(s.frame, s.visible, s.body)
+            images.write(s.frame, s.visible, s.body, s.fraction)
+    (recorded,) = open_dataset(str(bag))
+    (stored,) = open_dataset(str(folder))
+    assert [q.scenario for q in (scene, recorded, stored)] == ['normal'] * 3
+    lists = [list(q.open().samples) for q in (scene, recorded, stored)]
+    assert len(lists[0]) == 15
+    for one, two, three in zip(*lists, strict=True):
+        assert one.visible == two.visible == three.visible
+        assert one.body == two.body == three.body
+        assert one.frame.stamp_ns == two.frame.stamp_ns == three.frame.stamp_ns
+        assert np.array_equal(one.frame.color, two.frame.color)
+        assert np.array_equal(one.frame.color, three.frame.color)
+        np.testing.assert_allclose(one.frame.depth, two.frame.depth, atol=0.001)
+        np.testing.assert_allclose(one.frame.depth, three.frame.depth, atol=0.001)
 
 
 def test_real_people_walking_past_each_other(shared_data: Path):

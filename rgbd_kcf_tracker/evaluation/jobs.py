@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sample,
     Sequence,
     at_rate,
-    from_first_box,
+    from_first_view,
     without_depth,
 )
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
@@ -161,7 +161,7 @@ def _run_sequence(job: Job) -> list[Failure]:
         for one in (*passes.values(), *restarts.values()):
             one.feed(sample)
     if not samples:
-        raise RgbdKcfError(f'{sequence.name}: the target never shows')
+        raise RgbdKcfError(f'{sequence.name}: the target is never clearly in view')
     stamps = [s[0] for s in samples]
     body = [s[2] for s in samples] if opened.has_body else None
     write_truth(
@@ -230,7 +230,7 @@ def _meta(
 
 
 def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterator[Sample]:
-    samples: Any = from_first_box(opened.samples)
+    samples: Any = from_first_view(opened.samples)
     if options.rate_hz is not None and sequence.kind != 'sim':  # scenes are rendered at their rate
         samples = at_rate(samples, options.rate_hz)
     if not options.use_depth:

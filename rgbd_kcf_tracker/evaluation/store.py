@@ -25,9 +25,10 @@ import numpy as np
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import TrackCsvWriter
+from rgbd_kcf_tracker.recordings.results import HEADER
 from rgbd_kcf_tracker.trackers import Track
 
-TRACK_HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
 TRUTH_HEADER = (
     'frame', 'stamp_ns', 'x', 'y', 'width', 'height',
     'body_x', 'body_y', 'body_width', 'body_height', 'visible_fraction',
@@ -100,16 +101,16 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:
-    """One row per frame, in the format of ``rgbd-kcf track --output``."""
-    rows = [
-        (
-            index, stamp, *_cells(track.box), track.state.value,
-            '' if track.box is None else f'{track.score:.4f}',
-            '' if track.depth is None else f'{track.depth:.4f}',
-        )
-        for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True))
-    ]  # fmt: skip
-    write_atomically(path, _csv(TRACK_HEADER, rows))
+    """One row per frame, as ``rgbd-kcf track --output`` writes them."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        with TrackCsvWriter(temporary) as writer:
+            for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True)):
+                writer.write_track(index, stamp, track)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def read_tracks(path: Path) -> Tracks:
@@ -118,7 +119,7 @@ def read_tracks(path: Path) -> Tracks:
     Raises:
         DatasetError: naming the line that is none.
     """
-    rows = _rows(path, TRACK_HEADER[:8])
+    rows = _rows(path, HEADER[:8])
     boxes, scores, states = np.full((len(rows), 4), np.nan), np.full(len(rows), np.nan), []
     for index, row in enumerate(rows):
         try:

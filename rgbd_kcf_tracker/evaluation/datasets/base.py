@@ -20,6 +20,9 @@ from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 
+CLEAR_FRACTION = 0.5
+"""A target is clearly in view where at least this share of it shows."""
+
 
 class UnreadableError(DatasetError):
     """A folder cannot be read."""
@@ -117,13 +120,18 @@ def at_rate(samples: Iterable[Sample], rate_hz: float) -> Iterator[Sample]:
         yield sample
 
 
-def from_first_box(samples: Iterable[Sample]) -> Iterator[Sample]:
-    """The samples from the first in which the target shows."""
+def from_first_view(samples: Iterable[Sample]) -> Iterator[Sample]:
+    """The samples from the first in which the target is clearly in view."""
     started = False
     for sample in samples:
-        started = started or sample.visible is not None
+        started = started or is_clear(sample.visible, sample.fraction)
         if started:
             yield sample
+
+
+def is_clear(box: Box | None, fraction: float | None) -> bool:
+    """Whether the target shows, and at least :data:`CLEAR_FRACTION` of it where that is known."""
+    return box is not None and (fraction is None or fraction >= CLEAR_FRACTION)
 
 
 def file_token(*paths: Path) -> str:

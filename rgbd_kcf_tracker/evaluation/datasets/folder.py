@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token, group
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token, group, is_clear
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
     check_lengths,
@@ -22,9 +22,6 @@ from rgbd_kcf_tracker.recordings.textfiles import (
     read_lines,
     read_stamps,
 )
-
-CLEAR_FRACTION = 0.5
-"""A target is clearly in view where at least this share of it shows (by ``visible.txt``)."""
 
 TAIL_FRAMES = 15
 """Frames after a person was last seen that still count: the tracker must say that they are gone."""
@@ -83,10 +80,12 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         check_lengths(visible_path, len(fractions), images, path / 'rgb')
 
     seen = [i for i, box in enumerate(boxes) if box is not None]
-    clear = [i for i in seen if fractions is None or fractions[i] >= CLEAR_FRACTION]
-    if not seen:
-        raise DatasetError(f'{truth_path}: no line holds a box: the target is never seen')
-    start = clear[0] if clear else seen[0]
+    clear = [i for i in seen if is_clear(boxes[i], fractions[i] if fractions else None)]
+    if not clear:
+        raise DatasetError(
+            f'{truth_path}: the target is never clearly in view: no box to start from'
+        )
+    start = clear[0]
     end = min(len(images), seen[-1] + TAIL_FRAMES + 1) if person else len(images)
     frames = _frames(path, images, fps)
     return Opened(
