@@ -10,6 +10,12 @@ from rgbd_kcf_tracker.trackers import Track, Tracker, TrackState, create_tracker
 
 __version__ = '0.1.0'
 __all__ = [
-    'Box', 'Frame', 'Intrinsics', 'RgbdKcfError', 'Track', 'TrackState', 'Tracker',
+    'Box',
+    'Frame',
+    'Intrinsics',
+    'RgbdKcfError',
+    'Track',
+    'TrackState',
+    'Tracker',
     'create_tracker',
 ]

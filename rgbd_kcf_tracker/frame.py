@@ -38,14 +38,16 @@ class Frame:
         color = self.color
         if color.ndim != 3 or color.shape[2] != 3 or color.dtype != np.uint8 or color.size == 0:
             raise ImageError(
-                f'colour image is {color.shape} {color.dtype}: expected (height, width, 3) uint8 BGR'
+                f'colour image is {color.shape} {color.dtype}: '
+                'expected (height, width, 3) uint8 BGR'
             )
         depth = self.depth
         if depth is None:
             return
         if depth.dtype != np.float32 or depth.ndim != 2:
             raise ImageError(
-                f'depth image is {depth.shape} {depth.dtype}: expected (height, width) float32 metres'
+                f'depth image is {depth.shape} {depth.dtype}: '
+                'expected (height, width) float32 metres'
             )
         if depth.shape != color.shape[:2]:
             raise ImageError(

@@ -35,7 +35,8 @@ class Box:
             object.__setattr__(self, name, value)
         if self.width <= 0 or self.height <= 0:
             raise BoxError(
-                f'box {self.width:g} x {self.height:g} has no size: width and height must be above 0'
+                f'box {self.width:g} x {self.height:g} has no size: '
+                'width and height must be above 0'
             )
 
     @classmethod
@@ -133,7 +134,7 @@ class Intrinsics:
 
     @classmethod
     def guess(cls, width: int, height: int) -> Intrinsics:
-        """A camera of 60 degrees across, for where none is known (Kinect and Xtion class: 57 to 70)."""
+        """A camera of 60 degrees across, for where none is known (Kinect class: 57 to 70)."""
         focal = width / (2 * math.tan(math.radians(30)))
         return cls(focal, focal, (width - 1) / 2, (height - 1) / 2)
 

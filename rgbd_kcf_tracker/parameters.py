@@ -3,8 +3,8 @@
 
 """Parameters as data: one frozen dataclass per variant, each field with unit, range and source.
 
-The ROS parameter descriptors, the YAML in ``config/``, the command line's ``--param`` and the tables
-in ``docs/`` are all made from these dataclasses, so a parameter is written once.
+The ROS parameter descriptors, the YAML in ``config/``, the command line's ``--param`` and the
+tables in ``docs/`` are all made from these dataclasses, so a parameter is written once.
 """
 
 from __future__ import annotations
@@ -103,7 +103,9 @@ def describe(cls: type) -> tuple[ParameterInfo, ...]:
         if 'description' not in f.metadata:
             continue
         infos.append(
-            ParameterInfo(name=f.name, type=type(f.default), default=cast(Scalar, f.default), **f.metadata)
+            ParameterInfo(
+                name=f.name, type=type(f.default), default=cast(Scalar, f.default), **f.metadata
+            )
         )
     return tuple(infos)
 
@@ -127,7 +129,9 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         low, high = info.minimum, info.maximum
         if (low is not None and value < low) or (high is not None and value > high):
-            raise ParameterError(f'parameter {info.name} is {value}: it must be {_range_text(info)}')
+            raise ParameterError(
+                f'parameter {info.name} is {value}: it must be {_range_text(info)}'
+            )
     if info.choices and value not in info.choices:
         raise ParameterError(
             f'parameter {info.name} is {value!r}: choose one of {", ".join(info.choices)}'

@@ -84,5 +84,6 @@ def require_inside(box: Box, frame: Frame) -> None:
     if inside is None or inside.width < 1 or inside.height < 1:
         raise BoxError(
             f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} lies outside the '
-            f'{frame.width}x{frame.height} image: give x,y,width,height in pixels of the colour image'
+            f'{frame.width}x{frame.height} image: '
+            'give x,y,width,height in pixels of the colour image'
         )
