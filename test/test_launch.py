@@ -1,0 +1,177 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Launch files and camera profiles.
+
+launch is not on the package index: where it is not installed (apt's ROS 2 has it), the files run
+against stand-ins that only remember what they were given.
+"""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import pytest
+import yaml
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.ros.cameras import camera_profile, load_cameras
+from rgbd_kcf_tracker.ros.settings import NodeParameters
+
+PROJECT = Path(__file__).resolve().parent.parent
+CAMERAS = PROJECT / 'config' / 'cameras.yaml'
+
+
+class Remembered:
+    """Stands for any class of launch: keeps its arguments."""
+
+    def __init__(self, *values: Any, **named: Any) -> None:
+        self.values, self.named = values, named
+
+    def perform(self, context: Any) -> str:
+        return context[self.values[0]]
+
+
+@pytest.fixture
+def launch_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    contents = {
+        'launch': ('LaunchContext', 'LaunchDescription'),
+        'launch.actions': (
+            'DeclareLaunchArgument',
+            'IncludeLaunchDescription',
+            'OpaqueFunction',
+            'SetEnvironmentVariable',
+            'Shutdown',
+        ),
+        'launch.launch_description_sources': ('PythonLaunchDescriptionSource',),
+        'launch.substitutions': ('LaunchConfiguration',),
+        'launch_ros': (),
+        'launch_ros.actions': ('Node',),
+        'launch_ros.parameter_descriptions': ('ParameterValue',),
+    }
+    for name, classes in contents.items():
+        module = ModuleType(name)
+        for kind in classes:
+            setattr(module, kind, type(kind, (Remembered,), {}))
+        monkeypatch.setitem(sys.modules, name, module)
+    packages = SimpleNamespace(get_package_share_directory=lambda _: str(PROJECT))
+    monkeypatch.setitem(sys.modules, 'ament_index_python', ModuleType('ament_index_python'))
+    monkeypatch.setitem(sys.modules, 'ament_index_python.packages', packages)
+
+
+def start_tracker(**given: str) -> tuple[Any, list[Any]]:
+    """The node that tracker.launch.py starts with these arguments, and all its actions."""
+    found = runpy.run_path(str(PROJECT / 'launch' / 'tracker.launch.py'))
+    unknown = set(given) - set(found['ARGUMENTS'])
+    assert not unknown
+    defaults = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
+    actions = found['start'](defaults | given)
+    (node,) = (a for a in actions if type(a).__name__ == 'Node')
+    return node, actions
+
+
+@pytest.mark.parametrize('camera', list(load_cameras(CAMERAS)))
+@pytest.mark.parametrize('compressed', ['false', 'true'])
+def test_each_camera_is_remapped(launch_modules: None, camera: str, compressed: str) -> None:
+    node, _ = start_tracker(camera=camera, compressed=compressed)
+    profile = load_cameras(CAMERAS)[camera]
+    remapped = dict(node.named['remappings'])
+    if camera == 'none':
+        assert remapped == {}
+    else:
+        assert remapped == {
+            'color/image': profile.color,
+            'depth/image': profile.depth,
+            'color/camera_info': profile.info,
+        }
+    file, parameters = node.named['parameters']
+    assert Path(file).is_file()
+    assert parameters.get('color_transport') == ('compressed' if compressed == 'true' else None)
+    transports = {'color_transport', 'depth_transport'} & set(parameters)
+    NodeParameters(**{name: parameters[name] for name in transports})
+
+
+def test_arguments_reach_the_node(launch_modules: None) -> None:
+    node, actions = start_tracker(
+        camera='orbbec',
+        depth_topic='/my/depth',
+        variant='kcf',
+        init_box='1,2,3,4',
+        auto_init='True',
+        autostart='false',
+        use_sim_time='true',
+        namespace='left',
+        name='watcher',
+        fastdds_profile='',
+    )
+    assert dict(node.named['remappings'])['depth/image'] == '/my/depth'
+    assert dict(node.named['remappings'])['color/image'] == '/camera/color/image_raw'
+    parameters = node.named['parameters'][1]
+    assert parameters['init_box'].values == ('1,2,3,4',)
+    assert parameters['variant'] == 'kcf'
+    assert (parameters['auto_init'], parameters['autostart']) == (True, False)
+    assert parameters['use_sim_time'] is True
+    assert (node.named['namespace'], node.named['name']) == ('left', 'watcher')
+    assert len(actions) == 1
+    _, with_profile = start_tracker()
+    assert with_profile[0].values[0] == 'FASTRTPS_DEFAULT_PROFILES_FILE'
+    assert Path(with_profile[0].values[1]).is_file()
+
+
+def test_arguments_are_declared_with_their_meaning(launch_modules: None) -> None:
+    for file in ('tracker.launch.py', 'replay.launch.py'):
+        found = runpy.run_path(str(PROJECT / 'launch' / file))
+        (entities,) = found['generate_launch_description']().values
+        declared = [e for e in entities if type(e).__name__ == 'DeclareLaunchArgument']
+        assert [d.values[0] for d in declared] == list(found['ARGUMENTS'])
+        assert all(d.named['description'] for d in declared)
+
+
+def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None:
+    tracker = runpy.run_path(str(PROJECT / 'launch' / 'tracker.launch.py'))
+    replay = runpy.run_path(str(PROJECT / 'launch' / 'replay.launch.py'))
+    (entities,) = replay['generate_launch_description']().values
+    (included,) = (e for e in entities if type(e).__name__ == 'IncludeLaunchDescription')
+    passed = {name for name, _ in included.named['launch_arguments']}
+    assert passed <= set(tracker['ARGUMENTS'])
+    (node,) = (e for e in entities if type(e).__name__ == 'Node')
+    from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
+
+    names = {field for field in ReplayParameters.__dataclass_fields__}
+    assert set(node.named['parameters'][0]) <= names
+    settings = yaml.safe_load((PROJECT / 'config' / 'replayed.yaml').read_text(encoding='utf-8'))
+    NodeParameters(**settings['/**']['ros__parameters'])
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('mine: {color: /a, depth: /b}', 'camera mine has no info'),
+        ('mine: {color: /a, depth: /b, info: /c, colour: /d}', 'unknown colour'),
+        ('mine: [', 'cannot be read'),
+    ],
+)
+def test_bad_profiles_say_what_is_wrong(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / 'cameras.yaml'
+    path.write_text(text, encoding='utf-8')
+    with pytest.raises(ParameterError, match=words):
+        load_cameras(path)
+
+
+def test_unknown_camera_lists_the_known() -> None:
+    with pytest.raises(ParameterError, match='choose one of none, kinect2_hd'):
+        camera_profile(CAMERAS, 'webcam')
+
+
+def test_fastdds_profile_is_well_formed() -> None:
+    from xml.etree import ElementTree
+
+    root = ElementTree.parse(PROJECT / 'config' / 'fastdds.xml').getroot()
+    space = {'p': root.tag.partition('}')[0].strip('{')}
+    sizes = root.findall('.//p:segment_size', space)
+    assert int(sizes[0].text) >= 16 << 20
+    assert root.find('.//p:useBuiltinTransports', space).text == 'false'
