@@ -25,6 +25,13 @@ def _behind(
     return points, stage.uniform(*speed), stage.scene([], 1.0, room=room)
 
 
+def _far_and_near(stage: Stage, low: float, high: float) -> tuple[float, float, int]:
+    """Distances of a target and of somebody who hides it in passing, and a side."""
+    stage.place_camera(0.75, 1.3)
+    far = stage.uniform(low, high)
+    return far, far * stage.uniform(0.33, 0.44), stage.sign()
+
+
 @scenario('the target walks behind a cupboard, shelf or pile of boxes and comes out again')
 def occlusion(stage: Stage) -> Scene:
     """The thesis's full occlusion."""
@@ -66,7 +73,8 @@ def long_occlusion(stage: Stage) -> Scene:
 @scenario('the target is hidden a few frames after the start')
 def early_occlusion(stage: Stage) -> Scene:
     """A fifth to half a second after the given box."""
-    far, near, side = stage.uniform(2.8, 3.5), stage.uniform(1.1, 1.45), stage.sign()
+    stage.place_camera(0.75, 1.3)
+    far, near, side = stage.uniform(2.8, 3.5), stage.uniform(1.0, 1.25), stage.sign()
     x = stage.x(stage.uniform(-0.3, 0.3), far)
     meet = x * near / far
     speed = stage.uniform(1.2, 1.7)
@@ -80,13 +88,13 @@ def early_occlusion(stage: Stage) -> Scene:
         [(0, x, far), (3, x, far), (5, x + 0.8 * side, far)],
         heading=[(0, 0.0), (3, 0.2), (3.4, 1.5 * side)],
     )
-    return stage.scene([target, stage.walk(stage.person(), there + back)], 5.5)
+    return stage.scene([target, stage.walk(stage.tall_person(), there + back)], 5.5)
 
 
 @scenario('the target and another person walk past each other, then one overtakes the other')
 def crossing(stage: Stage) -> Scene:
     """The thesis's moving target and moving occluder."""
-    far, near, side = stage.uniform(2.7, 3.8), stage.uniform(1.15, 1.6), stage.sign()
+    far, near, side = _far_and_near(stage, 2.7, 3.8)
     speed = stage.uniform(0.7, 1.1)
     way = route([(stage.x(side * s, far), far) for s in (-0.7, 0.7, 0.7, -0.75)], speed)
     half, end = way[1][0], way[-1][0]
@@ -100,14 +108,14 @@ def crossing(stage: Stage) -> Scene:
         for t, x, pace in ((first, at[0], pace), (second, at[1], slow))
     ]
     cast: list[Actor] = [stage.walk(stage.person(), way)]
-    cast += [stage.walk(stage.person(), keys) for keys in others]
+    cast += [stage.walk(stage.tall_person(), keys) for keys in others]
     return stage.scene(cast, end + 0.5)
 
 
 @scenario('somebody passes before a standing target, and back, and may stop there')
 def passer_by(stage: Stage) -> Scene:
     """The thesis's standing target and moving occluder."""
-    far, near, side = stage.uniform(2.6, 3.6), stage.uniform(1.05, 1.45), stage.sign()
+    far, near, side = _far_and_near(stage, 2.6, 3.8)
     x = stage.x(stage.uniform(-0.3, 0.3), far)
     turn, meet = stage.uniform(-1, 1), x * near / far
     speed = stage.uniform(0.7, 1.2)
@@ -120,7 +128,7 @@ def passer_by(stage: Stage) -> Scene:
     cast: list[Actor] = [
         stage.walk(stage.person(), [(0, x, far)], heading=[(0, turn), (3, turn), (4, -turn)],
                    channels=channels),
-        stage.walk(stage.person(), there + on + back),
+        stage.walk(stage.tall_person(), there + on + back),
     ]  # fmt: skip
     return stage.scene(cast, min(back[-1][0], 9.0))
 
@@ -128,13 +136,13 @@ def passer_by(stage: Stage) -> Scene:
 @scenario('a hand-held camera, a walking target, and a passer-by who hides it')
 def camera_occlusion(stage: Stage) -> Scene:
     """Camera motion and occlusion together."""
-    far, near, side = stage.uniform(2.7, 3.6), stage.uniform(1.2, 1.6), stage.sign()
+    far, near, side = _far_and_near(stage, 2.7, 3.6)
     way = route([(stage.x(side * s, far), far) for s in (-0.5, 0.5, 0.5, -0.4)],
                 stage.uniform(0.6, 0.9))  # fmt: skip
     out = stage.x(1.6, near)
     begin = stage.uniform(0.1, 0.5) * way[-1][0]
     other = route([(side * out, near), (-side * out, near)], stage.uniform(0.7, 1.1), begin)
-    cast: list[Actor] = [stage.walk(stage.person(), way), stage.walk(stage.person(), other)]
+    cast: list[Actor] = [stage.walk(stage.person(), way), stage.walk(stage.tall_person(), other)]
     camera = stage.hand_held(stage.uniform(0.003, 0.01))
     return stage.scene(cast, min(way[-1][0] + 0.3, 8.0), camera=camera)
 
@@ -184,13 +192,14 @@ def behind_chair(stage: Stage) -> Scene:
 @scenario('the target steps behind a standing person and comes out on the other side')
 def behind_person(stage: Stage) -> Scene:
     """The thesis's occlusion by a person who stands still."""
+    stage.place_camera(0.75, 1.3)
     near, far, side = stage.uniform(1.5, 1.9), stage.uniform(2.8, 3.4), stage.sign()
     at = stage.uniform(-0.15, 0.15)
     points: list[Point] = [(stage.x(at + s * side, far), far) for s in (-0.65, 0, 0, 0.65)]
     way = route(points, stage.uniform(0.7, 1.0))
     cast: list[Actor] = [
         stage.walk(stage.person(), way),
-        stage.walk(stage.person(), [(0, stage.x(at, near), near)],
+        stage.walk(stage.tall_person(), [(0, stage.x(at, near), near)],
                    heading=[(0, stage.uniform(-3, 3))]),
     ]  # fmt: skip
     return stage.scene(cast, way[-1][0] + 0.8)

@@ -143,7 +143,7 @@ def mug_hand_held(stage: Stage) -> Scene:
                 tuple(stage.box_faces((0, 0), size, 'cardboard')),
                 Motion([(0, other[0], other[2])], channels={'lift': [(0, -top)]}), size[1],
             ))  # fmt: skip
-    away = stage.uniform(0.85, 1.05) * side
+    away = stage.uniform(1.15, 1.3) * side
     keys = [(0.0, 0.0), (1.2, 0.2 * side), (2.4, -0.15 * side), (3.6, away), (4.2, away),
             (5.4, 0.1 * side), (6.6, -0.2 * side)]  # fmt: skip
     slide = [(0.0, 0.0), (3.0, stage.uniform(-0.2, 0.2)), (6.5, stage.uniform(-0.2, 0.2))]

@@ -169,7 +169,9 @@ class SimulatedSequence:
         if options.has_depth:
             later = picture if options.delay_s == 0 else _Picture(self, t + options.delay_s, False)
             blind = any(a <= t < b for a, b in options.no_target_depth)
-            depth = self._sensor.depth(later.depth, later.target_mask if blind else None, rng)
+            depth = self._sensor.depth(
+                later.depth, picture.color, later.target_mask if blind else None, rng
+            )
         frame = Frame(color, depth, EPOCH_NS + offset_ns, self.intrinsics)
         return SimulatedFrame(frame, picture.truth())
 

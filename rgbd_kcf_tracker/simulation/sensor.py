@@ -5,9 +5,9 @@
 
 The depth camera has 512 x 424 pixels and a focal length of about 365 pixels: it is coarser than the
 colour image it is registered to. Its noise grows with the square of the distance (about 2 mm at
-1 m, 20 mm at 4 m), pixels at edges mix two surfaces or fall out, and the background that the depth
-camera cannot see past a nearer body, because it sits 52 mm beside the colour camera, has no
-reading.
+1 m, 20 mm at 4 m), pixels at edges mix two surfaces or fall out, what is black returns too little
+light, and the background that the depth camera cannot see past a nearer body, because it sits 52 mm
+beside the colour camera, has no reading.
 """
 
 from __future__ import annotations
@@ -117,12 +117,17 @@ class Sensor:
         return out
 
     def depth(
-        self, ideal: Floats, target: npt.NDArray[np.bool_] | None, rng: np.random.Generator
+        self,
+        ideal: Floats,
+        color: npt.NDArray[np.uint8],
+        target: npt.NDArray[np.bool_] | None,
+        rng: np.random.Generator,
     ) -> Floats:
         """The recorded depth of an ideal one.
 
         Args:
             ideal: ``(H, W)`` metres, inf where nothing is.
+            color: ``(H, W, 3)`` ideal colour image: what is dark returns little light.
             target: pixels that give no reading, or None.
             rng: of this frame.
 
@@ -149,6 +154,9 @@ class Sensor:
         first = np.minimum.accumulate(shadow[:, ::-1], axis=1)[:, ::-1]
         bad |= shadow > first + np.float32(0.75)
         bad |= self._holes[self._cut(rng)]
+        small = cv2.resize(color, self.small, interpolation=cv2.INTER_NEAREST)
+        # black hair and cloth fall out in part, the more the farther
+        bad |= (small.max(axis=2) < 30) & (chance < np.float32(0.05) * z)
         # beyond 4.5 m readings fall out more and more, beyond 8 m there are none
         bad |= (z - np.float32(4.5)) > np.float32(3.5) * np.sqrt(np.sqrt(chance))
         if self.options.narrow:

@@ -67,13 +67,18 @@ class Stage:
         self.half_tan = size[0] / 2 / camera.fx
         self.depth = float(rng.uniform(5.0, 7.5))
         self.half_width = float(rng.uniform(0.62, 0.95) * self.depth)
-        self.camera_height = float(rng.uniform(1.0, 1.5))
-        self.pitch = float(rng.uniform(0.0, 0.12))
+        self.camera_height = self.pitch = 0.0
+        self.place_camera(0.75, 1.6)
         self.cast: list[Wardrobe] = []
 
     def uniform(self, low: float, high: float) -> float:
         """A number between two bounds."""
         return float(self.rng.uniform(low, high))
+
+    def place_camera(self, low: float, high: float) -> None:
+        """Choose the camera's height, and a pitch that shows a person at 3 m from head to foot."""
+        self.camera_height = self.uniform(low, high)
+        self.pitch = math.atan((self.camera_height - 0.95) / 3.2) + self.uniform(-0.05, 0.07)
 
     def sign(self) -> int:
         """Left (-1) or right (1)."""
@@ -93,6 +98,11 @@ class Stage:
                 like = Wardrobe.random(self.rng)
             self.cast.append(like)
         return random_person(self.rng, like, child)[0]
+
+    def tall_person(self) -> Person:
+        """Somebody new who can hide others."""
+        person = self.person()
+        return replace(person, height=max(person.height, self.uniform(1.72, 1.8)))
 
     def walk(
         self, person: Person, points: Timed, heading: Keys | None = None,
