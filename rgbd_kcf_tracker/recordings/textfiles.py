@@ -14,6 +14,10 @@ from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 
+# ROS stamps hold 32 bits of seconds.
+_LAST_STAMP_NS = (1 << 31) * 1_000_000_000
+
+
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     """Sorts ``10.png`` after ``9.png``."""
     return tuple(
@@ -75,7 +79,10 @@ def read_stamps(path: Path) -> list[int]:
     stamps = []
     for number, line in enumerate(read_lines(path), start=1):
         try:
-            stamps.append(int(line.split()[0]))
+            stamp = int(line)
+            if not 0 <= stamp < _LAST_STAMP_NS:
+                raise ValueError
+            stamps.append(stamp)
         except ValueError:
             raise RecordingError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no stamp: '

@@ -1,0 +1,437 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The command line as a user meets it: options, outputs, errors, exit codes."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from bag_rig import CAMERA, COLOR, DEPTH, camera_messages, make_frames, write_mcap, write_ros1
+
+from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
+from rgbd_kcf_tracker.trackers import VARIANTS
+
+SQUARE = 40
+
+
+def moving_square(count: int = 12, depth: bool = True) -> list[tuple[Frame, Box]]:
+    """A textured square that goes right by 3 pixels a frame, nearer than its background."""
+    rng = np.random.default_rng(3)
+    background = cv2.GaussianBlur(rng.integers(0, 256, (120, 160, 3), np.uint8), (9, 9), 3)
+    target = cv2.resize(rng.integers(0, 256, (8, 8, 3), np.uint8), (SQUARE, SQUARE))
+    made = []
+    for number in range(count):
+        x, y = 30 + 3 * (number % 28), 40
+        color = background.copy()
+        color[y : y + SQUARE, x : x + SQUARE] = target
+        metres = np.full((120, 160), 3.0, np.float32)
+        metres[y : y + SQUARE, x : x + SQUARE] = 1.5
+        frame = Frame(color, metres if depth else None, number * 33_333_333, CAMERA)
+        made.append((frame, Box(x, y, SQUARE, SQUARE)))
+    return made
+
+
+def write_folder(path: Path, **options: Any) -> Path:
+    with SequenceWriter(path) as writer:
+        for frame, box in moving_square(**options):
+            writer.write(frame, box)
+    return path
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_folder(tmp_path_factory.mktemp('square') / 'square')
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline='') as file:
+        return list(csv.DictReader(file))
+
+
+def fails(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one line that the command fails with."""
+    assert main([str(a) for a in arguments]) == 2
+    captured = capsys.readouterr()
+    lines = [line for line in captured.err.splitlines() if not line.startswith('warning: ')]
+    assert len(lines) == 1, captured.err
+    assert lines[0].startswith('rgbd-kcf: error: ')
+    assert captured.out == ''
+    return lines[0]
+
+
+# -- track -------------------------------------------------------------------------------------
+
+
+def test_track_writes_csv_video_and_bag(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = {name: tmp_path / 'new' / f'out.{name}' for name in ('csv', 'mp4', 'mcap')}
+    arguments = ['track', str(folder), '--variant', 'kcf', '--output', str(out['csv'])]
+    code = main([*arguments, '--video', str(out['mp4']), '--bag', str(out['mcap'])])
+    assert code == 0
+    summary = capsys.readouterr().out
+    assert summary.startswith('square: 12 frames with kcf: 12 tracking; ')
+    assert str(out['csv']) in summary
+    found = rows(out['csv'])
+    assert [int(r['frame']) for r in found] == list(range(12))
+    assert [int(r['stamp_ns']) for r in found] == [n * 33_333_333 for n in range(12)]
+    assert all(r['state'] == 'tracking' for r in found)
+    for row, (_, box) in zip(found, moving_square(), strict=True):
+        assert float(row['x']) == pytest.approx(box.x, abs=3)
+    video = cv2.VideoCapture(str(out['mp4']))
+    assert video.get(cv2.CAP_PROP_FRAME_COUNT) == 12
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(30, abs=0.1)
+    with open_recording(out['mcap']) as recording:
+        assert len(recording) == 12
+        assert recording.groundtruth == [box for _, box in moving_square()]
+
+
+@pytest.mark.parametrize('variant', list(VARIANTS))
+def test_folder_and_bag_give_the_same_boxes(variant: str, folder: Path, tmp_path: Path) -> None:
+    assert main(['convert', str(folder), str(tmp_path / 'a.mcap')]) == 0
+    for name, source in (('folder', folder), ('bag', tmp_path / 'a.mcap')):
+        output = str(tmp_path / f'{name}.csv')
+        assert main(['track', str(source), '--variant', variant, '--output', output]) == 0
+    text = (tmp_path / 'folder.csv').read_text()
+    assert text == (tmp_path / 'bag.csv').read_text()
+    assert text.count('tracking') == 12
+
+
+@pytest.mark.parametrize('variant', list(VARIANTS))
+def test_colour_alone_works_for_every_variant(variant: str, tmp_path: Path) -> None:
+    """A folder without depth, as OTB's are."""
+    source = write_folder(tmp_path / 'a', depth=False)
+    (source / 'intrinsics.json').unlink()
+    output = tmp_path / 'a.csv'
+    assert main(['track', str(source), '--variant', variant, '--output', str(output)]) == 0
+    last = rows(output)[-1]
+    assert last['state'] == 'tracking'
+    assert float(last['x']) == pytest.approx(30 + 33, abs=6)
+    assert last['depth_m'] == ''
+    bag = tmp_path / 'a.mcap'
+    assert main(['convert', str(source), str(bag)]) == 0
+    again = tmp_path / 'b.csv'
+    arguments = ['track', str(bag), '--variant', variant, '--output', str(again)]
+    assert main([*arguments, '--depth-topic', 'none']) == 0
+    assert again.read_text() == output.read_text()
+
+
+def test_part_of_the_frames_from_a_given_box(folder: Path, tmp_path: Path) -> None:
+    output = tmp_path / 'a.csv'
+    arguments = ['track', str(folder), '--start', '3', '--end', '7', '--init', '39,40,40,40']
+    assert main([*arguments, '--output', str(output)]) == 0
+    found = rows(output)
+    assert [int(r['frame']) for r in found] == [3, 4, 5, 6]
+    assert [float(found[0][k]) for k in ('x', 'y', 'width', 'height')] == [39, 40, 40, 40]
+
+
+def test_rows_before_the_first_box_are_idle(tmp_path: Path) -> None:
+    source = write_folder(tmp_path / 'a')
+    text = (source / 'groundtruth.txt').read_text().splitlines()
+    text[:2] = ['nan,nan,nan,nan'] * 2
+    (source / 'groundtruth.txt').write_text('\n'.join(text))
+    assert main(['track', str(source), '--output', str(tmp_path / 'a.csv')]) == 0
+    found = rows(tmp_path / 'a.csv')
+    assert [r['state'] for r in found[:3]] == ['idle', 'idle', 'tracking']
+    assert (found[0]['x'], found[0]['score']) == ('', '')
+
+
+def test_csv_on_standard_output(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['track', str(folder), '--output', '-', '--end', '2']) == 0
+    captured = capsys.readouterr()
+    assert len(captured.out.splitlines()) == 3
+    assert 'square: 2 frames' in captured.err
+
+
+def test_rate_and_intrinsics_of_a_folder(tmp_path: Path) -> None:
+    source = write_folder(tmp_path / 'a')
+    (source / 'timestamps.txt').unlink()
+    (source / 'intrinsics.json').unlink()
+    bag = tmp_path / 'a.mcap'
+    options = ['--fps', '5', '--intrinsics', '100,101,50,51']
+    assert main(['track', str(source), '--bag', str(bag), *options]) == 0
+    with open_recording(bag) as recording:
+        assert recording.info().rate_hz == pytest.approx(5)
+        assert recording.intrinsics is not None
+        assert recording.intrinsics.fy == 101
+
+
+def test_bag_of_a_bag_keeps_its_names_and_metres(tmp_path: Path) -> None:
+    sent = camera_messages([f for f, _ in moving_square()])
+    source = write_ros1(tmp_path / 'a.bag', sent)
+    bag = tmp_path / 'out.mcap'
+    assert main(['track', str(source), '--init', '30,40,40,40', '--bag', str(bag)]) == 0
+    with open_recording(bag) as recording:
+        streams = {s.name: s for s in recording.info().streams}
+        assert streams[COLOR].role == 'color'
+        assert streams[DEPTH].role == 'depth'
+        assert '/tracker/box' in streams
+
+
+# -- bad input ---------------------------------------------------------------------------------
+
+
+def test_bad_values_say_what_to_write(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    track = ('track', folder)
+    assert 'X,Y,W,H' in fails(capsys, *track, '--init', '1,2,3')
+    assert 'X,Y,W,H' in fails(capsys, *track, '--init', 'a,b,c,d')
+    assert 'has no size' in fails(capsys, *track, '--init', '10,10,0,5')
+    assert 'has no size' in fails(capsys, *track, '--init', '10,10,-4,5')
+    assert 'finite' in fails(capsys, *track, '--init', 'nan,10,4,5')
+    assert '160x120' in fails(capsys, *track, '--init', '500,10,20,20')
+    assert 'FX,FY,CX,CY' in fails(capsys, *track, '--intrinsics', '5,5')
+    assert 'focal' in fails(capsys, *track, '--intrinsics', '0,5,5,5')
+    assert 'choose one of' in fails(capsys, *track, '--variant', 'magic')
+    assert 'unknown parameter' in fails(capsys, *track, '--param', 'magic=1')
+    assert 'padding' in fails(capsys, *track, '--variant', 'kcf', '--param', 'padding=-5')
+    assert 'padding' in fails(capsys, *track, '--variant', 'kcf', '--param', 'padding=wide')
+    assert 'key=value' in fails(capsys, *track, '--param', 'padding')
+    assert 'frames 0 to 11' in fails(capsys, *track, '--start', '12')
+    assert 'above --start 5' in fails(capsys, *track, '--start', '5', '--end', '5')
+    assert 'fps' in fails(capsys, *track, '--fps', '0')
+    assert 'tolerance' in fails(capsys, *track, '--tolerance', '-1')
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_box_outside_the_image_leaves_no_files(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ('track', folder, '--init', '500,10,20,20', '--output', tmp_path / 'a.csv')
+    fails(capsys, *arguments, '--bag', tmp_path / 'a.mcap', '--video', tmp_path / 'a.mp4')
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in (['track'], ['info'], ['convert']):
+        dest = [tmp_path / 'out.mcap'] if command == ['convert'] else []
+        assert 'does not exist' in fails(capsys, *command, tmp_path / 'none', *dest)
+        (tmp_path / 'letter.mcap').write_text('Dear reader, this is no recording.')
+        assert 'is no recording' in fails(capsys, *command, tmp_path / 'letter.mcap', *dest)
+
+
+def test_no_box_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_folder(tmp_path / 'a')
+    (source / 'groundtruth.txt').write_text('nan,nan,nan,nan\n' * 12)
+    assert 'no box from frame 0 to 11: give the target as --init' in fails(capsys, 'track', source)
+    (source / 'groundtruth.txt').unlink()
+    assert 'has no ground truth: give the target as --init' in fails(capsys, 'track', source)
+
+
+def test_topics_that_are_missing_or_too_many(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frames = make_frames(2)
+    source = write_mcap(tmp_path / 'a.mcap', camera_messages(frames, depth=None))
+    error = fails(capsys, 'track', source)
+    assert 'no depth topic' in error
+    assert COLOR in error
+    source = write_mcap(tmp_path / 'b.mcap', camera_messages(frames, info=None)[1::2])
+    error = fails(capsys, 'track', source)
+    assert 'no colour topic' in error
+    assert DEPTH in error
+    sent = camera_messages(frames) + camera_messages(frames, '/b/color/image', '/b/depth/image')
+    source = write_mcap(tmp_path / 'c.mcap', sent)
+    error = fails(capsys, 'track', source)
+    assert '2 cameras' in error
+    assert '--color-topic /b/color/image --depth-topic /b/depth/image' in error
+    arguments = ['track', str(source), '--color-topic', '/b/color/image', '--init', '5,5,30,30']
+    assert main(arguments) == 0
+
+
+def test_depth_of_another_size(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_folder(tmp_path / 'a')
+    cv2.imwrite(str(source / 'depth' / '000001.png'), np.ones((60, 80), np.uint16))
+    error = fails(capsys, 'track', source)
+    assert 'depth is 80x60 but colour is 160x120: register' in error
+
+
+def test_outputs_that_cannot_be(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'file').write_text('')
+    for option, name in (('--output', 'a.csv'), ('--video', 'a.mp4'), ('--bag', 'a.mcap')):
+        path = tmp_path / 'file' / 'sub' / name
+        assert f'{name} cannot be written' in fails(capsys, 'track', folder, option, path)
+    source = tmp_path / 'in.mcap'
+    assert main(['convert', str(folder), str(source)]) == 0
+    before = source.read_bytes()
+    capsys.readouterr()
+    assert 'is the source itself' in fails(capsys, 'track', source, '--bag', source)
+    assert 'part of the source' in fails(capsys, 'convert', source, source)
+    assert 'must end in .mcap' in fails(capsys, 'convert', source, tmp_path / 'a.bag')
+    assert source.read_bytes() == before
+
+
+def test_stream_whose_size_changes_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With a warning, all outputs, and a row for each frame."""
+    frames = [f for f, _ in moving_square()]
+    for number in range(6, 12):
+        frame = frames[number]
+        assert frame.depth is not None
+        frames[number] = dataclasses.replace(
+            frame,
+            color=np.ascontiguousarray(frame.color[:100, :140]),
+            depth=np.ascontiguousarray(frame.depth[:100, :140]),
+        )
+    source = write_mcap(tmp_path / 'a.mcap', camera_messages(frames))
+    out = [f'{tmp_path}/out.{end}' for end in ('csv', 'mp4', 'mcap')]
+    arguments = ['track', str(source), '--init', '30,40,40,40', '--output', out[0]]
+    for variant in VARIANTS:
+        options = ['--variant', variant, '--video', out[1], '--bag', out[2]]
+        assert main([*arguments, *options]) == 0
+        assert 'changes from 160x120 to 140x100 at frame 6' in capsys.readouterr().err
+        assert len(rows(Path(out[0]))) == 12
+
+
+# -- convert, info, main -----------------------------------------------------------------------
+
+
+def test_convert_a_bag_that_was_cut_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_mcap(tmp_path / 'a.mcap', camera_messages(make_frames(6)))
+    source.write_bytes(source.read_bytes()[:50_000])
+    assert main(['convert', str(source), str(tmp_path / 'b.mcap'), '--compression', 'lz4']) == 0
+    captured = capsys.readouterr()
+    assert 'was cut off or not closed' in captured.err
+    assert 'messages of 3 topics' in captured.out
+    assert main(['info', str(tmp_path / 'b.mcap')]) == 0
+    assert 'warning' not in capsys.readouterr().out
+
+
+def test_convert_with_names_of_kinect2_bridge(folder: Path, tmp_path: Path) -> None:
+    bag = tmp_path / 'a.mcap'
+    assert main(['convert', str(folder), str(bag), '--camera', 'kinect2_qhd']) == 0
+    with open_recording(bag) as recording:
+        names = {s.name for s in recording.info().streams}
+    assert '/kinect2/qhd/image_color_rect' in names
+
+
+def test_info(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['info', str(folder)]) == 0
+    text = capsys.readouterr().out
+    assert 'frames        12 (12 with depth), 0.4 s, 30.0 Hz' in text
+    assert 'fx 60.00  fy 61.00' in text
+    assert 'ground truth  12 frames' in text
+    source = write_mcap(tmp_path / 'a.mcap', camera_messages(make_frames(3)))
+    assert main(['info', str(source), '--json']) == 0
+    info = json.loads(capsys.readouterr().out)
+    assert info['frames'] == 3
+    roles = {s['name']: s['role'] for s in info['streams']}
+    assert roles[COLOR] == 'color'
+    source = write_mcap(tmp_path / 'b.mcap', camera_messages(make_frames(3), depth=None))
+    assert main(['info', str(source)]) == 0
+    text = capsys.readouterr().out
+    assert 'cannot be tracked as it is' in text
+    assert COLOR in text
+
+
+def run_program(*arguments: object, **options: Any) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+        **options,
+    )
+
+
+def test_program_prints_help_version_and_usage() -> None:
+    process = run_program('--help')
+    out, _ = process.communicate()
+    assert process.returncode == 0
+    for name in ('track', 'convert', 'info'):
+        assert f'\n    {name} ' in out
+    process = run_program('--version')
+    assert process.communicate()[0].startswith('rgbd-kcf ')
+    process = run_program('dance')
+    _, err = process.communicate()
+    assert process.returncode == 2
+    assert 'dance' in err
+
+
+def test_interrupted_run_leaves_good_files(tmp_path: Path) -> None:
+    """Ctrl-C: exit code 130, no traceback, and every file opens."""
+    source = write_folder(tmp_path / 'long', count=40)
+    images = sorted((source / 'rgb').iterdir())
+    for number in range(41, 1500):
+        for image in (images[number % 40], source / 'depth' / images[number % 40].name):
+            os.link(image, image.with_name(f'{number:06d}.png'))
+    (source / 'timestamps.txt').unlink()
+    out = {end: tmp_path / f'out.{end}' for end in ('csv', 'mp4', 'mcap')}
+    process = run_program(
+        'track', source, '--init', '30,40,40,40', '--output', out['csv'],
+        '--video', out['mp4'], '--bag', out['mcap'], '--variant', 'kcf', start_new_session=True
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        if out['csv'].exists() and len(out['csv'].read_text().splitlines()) > 30:
+            break
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert err.strip().splitlines()[-1] == 'rgbd-kcf: interrupted'
+    assert 'Traceback' not in err
+    count = len(rows(out['csv']))
+    assert 30 <= count < 1499
+    with open_recording(out['mcap']) as recording:
+        assert abs(len(recording) - count) <= 1
+        assert recording.warnings == []
+    assert cv2.VideoCapture(str(out['mp4'])).get(cv2.CAP_PROP_FRAME_COUNT) >= 20
+
+
+def test_closed_pipe_is_no_traceback(folder: Path) -> None:
+    process = run_program('track', folder, '--output', '-')
+    assert process.stdout is not None
+    assert process.stderr is not None
+    process.stdout.close()
+    err = process.stderr.read()
+    process.wait()
+    assert process.returncode != 0
+    assert 'Traceback' not in err
+
+
+# -- real recordings ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('name', 'fps', 'start', 'end'), [('redkitchen', 30, 0, 40), ('filinha', 5, 55, 95)]
+)
+def test_real_recordings_give_the_same_boxes_from_folder_and_bag(
+    name: str, fps: int, start: int, end: int, shared_data: Path, tmp_path: Path
+) -> None:
+    """Part of each, by links, as the bag of a whole one is half a gigabyte."""
+    whole, source = shared_data / 'rgbd' / name, tmp_path / name
+    for kind in ('rgb', 'depth'):
+        (source / kind).mkdir(parents=True)
+        for path in sorted((whole / kind).iterdir())[start:end]:
+            (source / kind / path.name).symlink_to(path)
+    truth = (whole / 'groundtruth.txt').read_text().splitlines()[start:end]
+    (source / 'groundtruth.txt').write_text('\n'.join(truth))
+    bag = tmp_path / 'a.mcap'
+    assert main(['convert', str(source), str(bag), '--fps', str(fps)]) == 0
+    for number, path in enumerate((source, bag)):
+        output = str(tmp_path / f'{number}.csv')
+        assert main(['track', str(path), '--output', output, '--fps', str(fps)]) == 0
+    assert (tmp_path / '0.csv').read_text() == (tmp_path / '1.csv').read_text()
+    assert 'tracking' in (tmp_path / '0.csv').read_text()

@@ -1,0 +1,293 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is written: CSV, video, drawings, and the tracker's topics in a bag."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from bag_rig import CAMERA, assert_same_frames, make_frames
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings import (
+    KINECT2_HD,
+    KINECT2_SD,
+    BagWriter,
+    TrackCsvWriter,
+    VideoWriter,
+    draw_track,
+    open_recording,
+)
+from rgbd_kcf_tracker.recordings.encoding import millimetres
+from rgbd_kcf_tracker.trackers import Track, TrackState
+
+SEEN = Track(Box(10.25, 8.5, 20, 30.125), TrackState.TRACKING, 0.875, 2.5, (0.1, -0.2, 2.5))
+HIDDEN = Track(None, TrackState.OCCLUDED, 0.0, 2.5)
+
+
+def test_csv_rows(tmp_path: Path) -> None:
+    path = tmp_path / 'new' / 'a.csv'
+    with TrackCsvWriter(path) as writer:
+        writer.write_track(0, 123, Track(None, TrackState.IDLE))
+        writer.write_track(1, 456, SEEN)
+        writer.write_track(2, 789, HIDDEN)
+        writer.write_track(3, 999, dataclasses.replace(SEEN, depth=None))
+        # Each row is there as soon as it is written.
+        assert len(path.read_text().splitlines()) == 5
+    assert path.read_text().splitlines() == [
+        'frame,stamp_ns,x,y,width,height,state,score,depth_m',
+        '0,123,,,,,idle,,',
+        '1,456,10.2500,8.5000,20.0000,30.1250,tracking,0.8750,2.5000',
+        '2,789,,,,,occluded,,',
+        '3,999,10.2500,8.5000,20.0000,30.1250,tracking,0.8750,',
+    ]
+
+
+def unwritable(tmp_path: Path) -> Path:
+    """A folder that cannot be made, for root too: its parent is a file."""
+    (tmp_path / 'file').write_text('')
+    return tmp_path / 'file' / 'folder'
+
+
+@pytest.mark.parametrize('make', [TrackCsvWriter, VideoWriter, BagWriter])
+def test_output_that_cannot_be_written(make: Any, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r'out\.x cannot be written'):
+        make(unwritable(tmp_path) / 'out.x')
+    with pytest.raises(RecordingError, match='is a folder'):
+        make(tmp_path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
+def test_a_folder_without_write_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(RecordingError, match='Permission denied'):
+        TrackCsvWriter(tmp_path / 'a.csv')
+
+
+def test_a_full_disk_is_an_error() -> None:
+    if not Path('/dev/full').exists():
+        pytest.skip('no /dev/full on this system')
+    with pytest.raises(RecordingError, match='No space left'):
+        TrackCsvWriter('/dev/full')
+
+    def write() -> None:
+        with BagWriter('/dev/full') as bag:
+            for frame in make_frames():
+                bag.write_frame(frame)
+
+    with pytest.raises(RecordingError, match='No space left'):
+        write()
+
+
+# -- bag ---------------------------------------------------------------------------------------
+
+
+def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> None:
+    frames = make_frames(3)
+    with BagWriter(tmp_path / 'a.mcap', KINECT2_HD, annotate=True) as writer:
+        for frame, track in zip(frames, (SEEN, HIDDEN, SEEN), strict=True):
+            writer.write_frame(frame)
+            writer.write_track(frame, track)
+    with open_recording(tmp_path / 'a.mcap') as recording:
+        assert_same_frames(list(recording.frames()), frames)
+    found: dict[str, list[Any]] = {}
+    with (tmp_path / 'a.mcap').open('rb') as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for item in reader.iter_decoded_messages():
+            found.setdefault(item.channel.topic, []).append(item.decoded_message)
+    assert {name: len(messages) for name, messages in found.items()} == {
+        '/kinect2/hd/image_color_rect': 3,
+        '/kinect2/hd/image_depth_rect': 3,
+        '/kinect2/hd/camera_info': 3,
+        '/tracker/box': 3,
+        '/tracker/occluded': 3,
+        '/tracker/roi': 2,
+        '/tracker/position': 2,
+        '/tracker/marker': 3,
+        '/tracker/image_annotated/compressed': 3,
+    }
+    color = found['/kinect2/hd/image_color_rect'][0]
+    assert (color.encoding, color.header.frame_id) == ('bgr8', 'kinect2_rgb_optical_frame')
+    box, hidden, _ = found['/tracker/box']
+    assert [(p.x, p.y) for p in box.polygon.points] == [
+        (10.25, 8.5), (30.25, 8.5), (30.25, 38.625), (10.25, 38.625)
+    ]  # fmt: skip
+    assert (box.header.stamp.sec, box.header.stamp.nanosec) == (
+        color.header.stamp.sec,
+        color.header.stamp.nanosec,
+    )
+    assert box.header.frame_id == color.header.frame_id
+    assert not hidden.polygon.points
+    assert [m.data for m in found['/tracker/occluded']] == [False, True, False]
+    roi = found['/tracker/roi'][0]
+    assert (roi.x_offset, roi.y_offset, roi.width, roi.height) == (10, 8, 21, 31)
+    point = found['/tracker/position'][0].point
+    assert (point.x, point.y, point.z) == (0.1, -0.2, 2.5)
+    marker, gone, _ = found['/tracker/marker']
+    assert (marker.action, gone.action) == (0, 2)
+    assert marker.scale.x == pytest.approx(20 * 2.5 / CAMERA.fx)
+    assert marker.scale.y == pytest.approx(30.125 * 2.5 / CAMERA.fy)
+    info = found['/kinect2/hd/camera_info'][0]
+    assert list(info.k) == [60, 0, 31.5, 0, 61, 23.5, 0, 0, 1]
+    packed = np.frombuffer(found['/tracker/image_annotated/compressed'][0].data, np.uint8)
+    assert cv2.imdecode(packed, cv2.IMREAD_COLOR).shape == (48, 64, 3)
+
+
+def test_bag_in_metres_keeps_every_depth(tmp_path: Path) -> None:
+    frame = make_frames(1)[0]
+    depth = np.full((48, 64), 1.23456789, np.float32)
+    depth[0, 0] = np.nan
+    frame = dataclasses.replace(frame, depth=depth)
+    path = tmp_path / 'a.mcap'
+    with BagWriter(path, KINECT2_SD, depth_encoding='32FC1', compression='lz4') as writer:
+        writer.write_frame(frame)
+    with open_recording(path) as recording:
+        assert_same_frames(list(recording.frames()), [frame])
+
+
+def test_colour_alone_is_written_and_read(tmp_path: Path) -> None:
+    frame = Frame(make_frames(1)[0].color, None, 5)
+    with BagWriter(tmp_path / 'a.mcap') as writer:
+        writer.write_frame(frame)
+    with pytest.raises(RecordingError, match='no depth topic'):
+        open_recording(tmp_path / 'a.mcap')
+
+
+def test_choices_are_checked(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match='compression'):
+        BagWriter(tmp_path / 'a.mcap', compression='gzip')
+    with pytest.raises(ParameterError, match='depth encoding'):
+        BagWriter(tmp_path / 'a.mcap', depth_encoding='8UC1')
+
+
+def test_millimetres() -> None:
+    depth = np.array([[np.nan, 0, -1, 0.0004, 0.0006, 1.2344, 65.535, 65.6, np.inf]], np.float32)
+    assert millimetres(depth).tolist() == [[0, 0, 0, 0, 1, 1234, 65535, 0, 0]]
+
+
+# -- drawing and video -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('size', [(1, 1), (3, 2), (64, 48), (1920, 1080)])
+@pytest.mark.parametrize(
+    'box',
+    [None, Box(-5, -5, 20, 20), Box(1e12, 5, 5, 5), Box(-1e9, -1e9, 3e9, 3e9), Box(0, 0, 0.1, 0.1)],
+)
+def test_drawing_never_fails_and_leaves_the_picture(size: tuple[int, int], box: Any) -> None:
+    image = np.full((size[1], size[0], 3), 90, np.uint8)
+    image.flags.writeable = False
+    track = HIDDEN if box is None else dataclasses.replace(SEEN, box=box)
+    out = draw_track(image, track, truth=box, caption='frame 5')
+    assert out.shape == image.shape
+    assert out.flags.writeable
+    assert np.all(image == 90)
+
+
+def test_box_is_drawn_where_it_is() -> None:
+    image = np.zeros((480, 640, 3), np.uint8)
+    out = draw_track(image, Track(Box(100, 200, 50, 60), TrackState.TRACKING, 1.0))
+    rows, columns = np.nonzero(out[100:].any(axis=2))
+    assert abs(columns.min() - 100) <= 3
+    assert abs(columns.max() - 149) <= 3
+    assert abs(rows.min() + 100 - 200) <= 3
+    assert abs(rows.max() + 100 - 259) <= 3
+
+
+def frames_of(path: Path) -> list[Any]:
+    video = cv2.VideoCapture(str(path))
+    frames = []
+    while True:
+        good, image = video.read()
+        if not good:
+            return frames
+        frames.append(image)
+
+
+def streams_of(path: Path) -> str:
+    import imageio_ffmpeg
+
+    program = imageio_ffmpeg.get_ffmpeg_exe()
+    return subprocess.run(
+        [program, '-hide_banner', '-i', str(path)], capture_output=True, text=True, check=False
+    ).stderr
+
+
+def test_video_is_h264_that_plays_everywhere(tmp_path: Path) -> None:
+    """Odd sides, a size that changes, and a rate of its own."""
+    path = tmp_path / 'a.mp4'
+    with VideoWriter(path, 5) as writer:
+        for number in range(10):
+            shape = (481, 641, 3) if number < 7 else (240, 640, 3)
+            writer.write(np.full(shape, 20 * number, np.uint8))
+    frames = frames_of(path)
+    assert len(frames) == 10
+    assert frames[0].shape == (482, 642, 3)
+    assert abs(int(frames[5][200, 200, 0]) - 100) < 8
+    assert abs(int(frames[9][240, 200, 0]) - 180) < 8
+    assert int(frames[9][5, 200, 0]) < 8
+    text = streams_of(path)
+    assert 'h264' in text
+    assert 'yuv420p' in text
+    assert '5 fps' in text
+
+
+def test_video_without_a_picture_leaves_no_file(tmp_path: Path) -> None:
+    with VideoWriter(tmp_path / 'a.mp4'):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_video_of_an_unknown_kind_says_so(tmp_path: Path) -> None:
+    def write() -> None:
+        with VideoWriter(tmp_path / 'a.xyz') as writer:
+            for _ in range(50):
+                writer.write(np.zeros((480, 640, 3), np.uint8))
+
+    with pytest.raises(RecordingError, match='ffmpeg says'):
+        write()
+
+
+WRITE_VIDEO = """
+import sys
+import numpy as np
+from rgbd_kcf_tracker.recordings import VideoWriter
+with VideoWriter(sys.argv[1]) as writer:
+    for number in range(10**9):
+        writer.write(np.full((48, 64, 3), number % 250, np.uint8))
+        if number == 60:
+            print(number, flush=True)
+"""
+
+
+def test_video_is_whole_after_kill_9(tmp_path: Path) -> None:
+    path = tmp_path / 'a.mp4'
+    process = subprocess.Popen(
+        [sys.executable, '-c', WRITE_VIDEO, str(path)],
+        stdout=subprocess.PIPE,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    # ffmpeg, which goes on by itself, holds standard output no longer than it needs to finish.
+    for _ in range(200):
+        if 'Video:' in streams_of(path):
+            break
+        time.sleep(0.05)
+    assert len(frames_of(path)) > 0
