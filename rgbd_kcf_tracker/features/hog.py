@@ -159,7 +159,8 @@ class HogExtractor:
         row *= self._cells
         # A channel of a (pixels, 1, 4) image per entry of a column; cv2 interleaves fastest.
         indices = self._spread.indices
-        np.add(self._target, cv2.merge([row, row, row, row])[:, 0, :], out=indices.reshape(-1, 4))
+        column = row[:, None]  # OpenCV 5 would take a vector for one dimension less
+        np.add(self._target, cv2.merge([column] * 4)[:, 0, :], out=indices.reshape(-1, 4))
         histograms: Features = self._spread @ magnitude
         return histograms.reshape(_SIGNED, self.shape[1], self.shape[2])
 
