@@ -30,7 +30,8 @@ def search_span(
         speed: target widths per second that a hidden target may move.
         image_width: beyond which there is nothing to find.
     """
-    return min((span + speed * hidden_s) * width, image_width)
+    # Whole widths more, so that the strip of features has few sizes.
+    return min((span + math.ceil(speed * hidden_s)) * width, image_width)
 
 
 def window_starts(reach_cells: int, step_cells: int) -> npt.NDArray[np.int64]:

@@ -60,7 +60,7 @@ class RgbdParameters(DepthParameters):
         source='thesis figure 4.8 (grows with the width)',
     )
     search_step: float = parameter(
-        0.25,
+        0.5,
         'Shift of the sliding window, in target widths.',
         minimum=0.02,
         maximum=2.0,
@@ -114,16 +114,17 @@ class RgbdTracker(DepthAwareTracker):
         offsets = window_starts(
             round(span / cell), step_in_cells(p.search_step * self._box.width, cell)
         )
-        stack = windows(self._strip(frame, model, offsets), model.taper, offsets)
+        cx = self._box.cx + offsets * cell
+        inside = ((cx >= 0) & (cx <= frame.width)) | (offsets == 0)
+        strip = self._strip(frame, model, offsets)
+        offsets, cx = offsets[inside], cx[inside]
+        stack = windows(strip, model.taper, offsets)
         responses = model.filter.respond(stack)
         if model.filter is not model.first:
             # The first template, which nothing that was learned by mistake has touched.
             responses = np.maximum(responses, model.first.respond(stack))
-        cx = self._box.cx + offsets * cell
-        peaks = responses.max(axis=(1, 2))
-        peaks[(cx < 0) | (cx > frame.width)] = -np.inf
-        middle = len(offsets) // 2
-        index = int(np.argmax(peaks))
+        middle = int(np.flatnonzero(offsets == 0)[0])
+        index = int(np.argmax(responses.max(axis=(1, 2))))
         best = model.place(responses[index], float(cx[index]), self._box.cy)
         return best, model.place(responses[middle], self._box.cx, self._box.cy)
 
