@@ -301,7 +301,8 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
     (tmp_path / 'walk_2.txt').write_text(good)
     code = main([
         'evaluate', str(scenes), '--variants', 'kcf', '--boxes', f'peer={tmp_path}', '--jobs', '1',
-        '--short-term', '--report', str(report), '--export', 'vot', '--export', 'princeton',
+        '--short-term', '--eao-lengths', '3-9', '--report', str(report),
+        '--export', 'vot', '--export', 'princeton',
     ])  # fmt: skip
     assert code == 0
     printed = capsys.readouterr().out
@@ -387,6 +388,7 @@ def test_the_command_lists_what_failed_and_goes_on(scenes: Path, tmp_path: Path,
         (['sim:normal', '--size', 'big'], '--size'),
         (['sim:normal', '--seeds', 'x'], 'seeds'),
         (['sim:normal', '--boxes', 'x'], 'NAME=FOLDER'),
+        (['sim:normal', '--eao-lengths', '9-3'], '--eao-lengths'),
         (['sim:normal', '--variants', 'kcf', '--ablate'], '--ablate'),
         (['sim:normal', 'sim:normal'], 'two sequences are named normal/1'),
     ],

@@ -111,6 +111,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also run VOT's protocol with re-initialisation (takes twice as long)",
     )  # fmt: skip
     group.add_argument(
+        '--eao-lengths', metavar='LOW-HIGH',
+        help='sequence lengths over which EAO is averaged: 108-371 for VOT2015, 46-291 for VOT2019 '
+        '(default: the typical lengths of the sequences)',
+    )  # fmt: skip
+    group.add_argument(
         '--fresh', action='store_true', help='run again what the report folder already holds'
     )
     group.add_argument(
@@ -129,6 +134,7 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.tables import overview
 
     contenders, ablated = _contenders(args)
+    eao_lengths = _lengths(args.eao_lengths)
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
     jobs = _default_jobs() if args.jobs is None else args.jobs
     if jobs < 1:
@@ -141,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
     for form in args.export:
         export(args.report, sequences, contenders, options, form)
     words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
-    heading = Heading(', '.join(args.dataset), _in_words(args), words, tuple(ablated))
+    heading = Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
     if not collected.results and collected.unmeasured:
         print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
     else:
@@ -247,6 +253,15 @@ def _size(text: str) -> tuple[int, int]:
     if not by or not width.isdigit() or not height.isdigit():
         raise ParameterError(f'--size {text!r}: give WIDTHxHEIGHT, such as 960x540')
     return int(width), int(height)
+
+
+def _lengths(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    low, dash, high = text.partition('-')
+    if not (dash and low.isdigit() and high.isdigit() and 0 < int(low) <= int(high)):
+        raise ParameterError(f'--eao-lengths {text!r}: give LOW-HIGH, such as 108-371')
+    return int(low), int(high)
 
 
 def _distinct(sequences: list[Benchmark]) -> list[Benchmark]:

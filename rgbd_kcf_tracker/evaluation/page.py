@@ -36,7 +36,6 @@ def render(measured: Measured, content: Mapping[str, Any]) -> str:
     frames = {r.sequence: len(r.stamps_ns) for r in measured.results}
     return environment.get_template(TEMPLATE).render(
         **content,
-        title=f'Trackers on {content["dataset"]}',
         version=rgbd_kcf_tracker.__version__,
         date=datetime.now(timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
         sequences=len(measured.sequences),

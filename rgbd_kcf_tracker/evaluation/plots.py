@@ -146,7 +146,9 @@ def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
     return _png(figure)
 
 
-def expected_overlap_plot(runs: Mapping[tuple[str, str], vot.ShortTermRun]) -> bytes:
+def expected_overlap_plot(
+    runs: Mapping[tuple[str, str], vot.ShortTermRun], lengths: tuple[int, int] | None = None
+) -> bytes:
     """VOT's expected average overlap over sequence length, the averaged lengths shaded."""
     figure = _figure(5.2, 3.6)
     axes = figure.add_subplot()
@@ -157,7 +159,7 @@ def expected_overlap_plot(runs: Mapping[tuple[str, str], vot.ShortTermRun]) -> b
         longest = max(len(r.codes) for r in own)
         curve = vot.expected_overlap_curve(own, longest)
         axes.plot(np.arange(1, longest + 1), curve, color=palette[tracker], lw=1.8, label=tracker)
-        low, high = vot.typical_lengths([len(r.codes) for r in own])
+        low, high = lengths or vot.typical_lengths([len(r.codes) for r in own])
         if tracker == trackers[0]:
             axes.axvspan(low, max(high, low + 1), color=_PARTLY, zorder=0)
     axes.set(

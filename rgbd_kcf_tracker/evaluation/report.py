@@ -29,16 +29,18 @@ class Heading:
     """What stands at the top of a report.
 
     Attributes:
-        dataset: as the user gave it.
+        datasets: as the user gave them.
         options: in words.
         command: that was typed, or ''.
         ablated: names of variants whose ingredients were switched off in turn.
+        eao_lengths: sequence lengths over which EAO is averaged, None for the typical ones.
     """
 
-    dataset: str
+    datasets: tuple[str, ...]
     options: str = 'as they are'
     command: str = ''
     ablated: tuple[str, ...] = ()
+    eao_lengths: tuple[int, int] | None = None
 
 
 def write_report(
@@ -67,7 +69,7 @@ def write_report(
     reliability, reliabilities = tables.reliability(measured)
     protocols = [t for t in (tables.otb_protocol(measured),) if t is not None]
     if collected.short_term:
-        protocols.append(thesis_tables.short_term(collected.short_term))
+        protocols.append(thesis_tables.short_term(collected.short_term, heading.eao_lengths))
     content: dict[str, Any] = {
         'overview': tables.overview(measured),
         'ablations': [tables.ablation(measured, name) for name in heading.ablated],
@@ -99,14 +101,17 @@ def write_report(
         'unmeasured': collected.unmeasured,
         'main': main,
         'palette': palette,
-        'dataset': heading.dataset,
+        'title': f'Trackers on {", ".join(Path(text).name for text in heading.datasets)}',
+        'dataset': ', '.join(heading.datasets),
         'options': heading.options,
         'command': heading.command,
     }
     if reliabilities:
         content['reliability_plot'] = page.uri(plots.reliability_plot(reliabilities))
     if collected.short_term:
-        content['eao_plot'] = page.uri(plots.expected_overlap_plot(collected.short_term))
+        content['eao_plot'] = page.uri(
+            plots.expected_overlap_plot(collected.short_term, heading.eao_lengths)
+        )
     write_atomically(folder / PAGE, page.render(measured, content))
     return measured
 
@@ -140,7 +145,7 @@ def _numbers(
 ) -> dict[str, Any]:
     return {
         'version': rgbd_kcf_tracker.__version__,
-        'dataset': heading.dataset,
+        'datasets': heading.datasets,
         'options': heading.options,
         'trackers': {
             c.name: {'kind': c.kind, 'target': c.target, **dict(c.overrides)} for c in contenders

@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.evaluation.store import slug
 FRAMES = 8
 COLUMNS = 4
 _TRUTH = (255, 255, 255)
+_SHADOW = (0, 0, 0)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 Picture = npt.NDArray[np.uint8]
@@ -38,7 +39,7 @@ def strip(
         folder: of the run.
         sequence: its name.
         scale: of the pictures that were kept.
-        truth: ``(N, 4)`` visible part, drawn white and dashed.
+        truth: ``(N, 4)`` visible part, drawn dashed in black and white.
         boxes: per tracker ``(N, 4)``, drawn in the tracker's colour.
         palette: colours as ``#rrggbb``.
         interesting: ``(N,)`` frames that should be among those shown (occlusion, errors).
@@ -113,6 +114,7 @@ def _dashed(image: Picture, box: Array) -> None:
         return
     left, top = int(box[0]), int(box[1])
     right, bottom = int(box[0] + box[2]), int(box[1] + box[3])
+    cv2.rectangle(image, (left, top), (right, bottom), _SHADOW, 1)  # seen on bright pictures too
     for x in range(left, right, 8):
         for y in (top, bottom):
             cv2.line(image, (x, y), (min(x + 4, right), y), _TRUTH, 1)

@@ -134,12 +134,14 @@ def matrices(measured: Measured) -> list[Table]:
     ]  # fmt: skip
 
 
-def short_term(runs: Mapping[tuple[str, str], vot.ShortTermRun]) -> Table:
+def short_term(
+    runs: Mapping[tuple[str, str], vot.ShortTermRun], lengths: tuple[int, int] | None = None
+) -> Table:
     """VOT's accuracy, robustness and EAO (as Tables 3.4 and 3.5)."""
     rows: list[tuple[Cell, ...]] = []
     for tracker in dict.fromkeys(t for t, _ in runs):
         own = [run for (t, _), run in runs.items() if t == tracker]
-        low, high = vot.typical_lengths([len(r.codes) for r in own])
+        low, high = lengths or vot.typical_lengths([len(r.codes) for r in own])
         values = (
             vot.expected_average_overlap(own, low, high),
             vot.mean_accuracy(own),
@@ -181,7 +183,8 @@ def _matrix(
         ('tracker', 'TP %', 'FP %', 'FN %', 'TN %'),
         tuple(rows),
         digits=2,
-        note=f'Frames of {kept} sequences pooled. {_NOT_OURS if quoted else ""}',
+        note=f'Frames of {kept} sequence{"" if kept == 1 else "s"} pooled. '
+        f'{_NOT_OURS if quoted else ""}'.strip(),
     )
 
 
