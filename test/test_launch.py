@@ -141,7 +141,7 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
     (node,) = (e for e in entities if type(e).__name__ == 'Node')
     from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
 
-    names = {field for field in ReplayParameters.__dataclass_fields__}
+    names = set(ReplayParameters.__dataclass_fields__)
     assert set(node.named['parameters'][0]) <= names
     settings = yaml.safe_load((PROJECT / 'config' / 'replayed.yaml').read_text(encoding='utf-8'))
     NodeParameters(**settings['/**']['ros__parameters'])

@@ -36,12 +36,13 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--count', type=int, default=300)
     parser.add_argument('--frames', type=int, default=20, help='different frames to play')
     parser.add_argument('--ahead', type=int, default=3, help='with rate 0: pairs under way at most')
+    parser.add_argument('--compressed', action='store_true', help='JPEG and compressedDepth PNG')
     options = parser.parse_args(args)
     keep_large_blocks()
     import rclpy
 
     rclpy.init()
-    camera = Camera(options.size, options.frames)
+    camera = Camera(options.size, options.frames, options.compressed)
     try:
         if not camera.await_listener(MATCH_TIMEOUT_S):
             return 1
@@ -61,22 +62,25 @@ def main(args: list[str] | None = None) -> int:
 class Camera:
     """Publishers of a colour, a depth and a camera_info topic, and what they send."""
 
-    def __init__(self, size: str, frames: int) -> None:
+    def __init__(self, size: str, frames: int, compressed: bool) -> None:
         from geometry_msgs.msg import PolygonStamped
         from rclpy.node import Node
         from rclpy.qos import QoSProfile
-        from sensor_msgs.msg import CameraInfo, Image
+        from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
         self.node = Node('camera', namespace=NAMESPACE)
         qos = QoSProfile(depth=5)
-        self._color = self.node.create_publisher(Image, 'color/image', qos)
-        self._depth = self.node.create_publisher(Image, 'depth/image', qos)
+        kind: Any = CompressedImage if compressed else Image
+        color, depth = ('/compressed', '/compressedDepth') if compressed else ('', '')
+        self._color = self.node.create_publisher(kind, f'color/image{color}', qos)
+        self._depth = self.node.create_publisher(kind, f'depth/image{depth}', qos)
         self._info = self.node.create_publisher(CameraInfo, 'color/camera_info', qos)
         self._answers = 0
         self.node.create_subscription(
             PolygonStamped, 'tracker/box', self._answered, QoSProfile(depth=100)
         )
-        self._messages = list(_messages(SIZES[size], frames))
+        messages = _messages(SIZES[size], frames)
+        self._messages = [_packed(m) for m in messages] if compressed else list(messages)
 
     def _answered(self, _: Any) -> None:
         self._answers += 1
@@ -155,6 +159,27 @@ def _messages(size: tuple[int, int], frames: int) -> Iterator[tuple[Any, Any, An
             image_message(header, millimetres, '16UC1'),
             info,
         )
+
+
+def _packed(messages: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+    """The same as image_transport's plugins would send it."""
+    import array
+
+    import cv2
+    import numpy as np
+    from sensor_msgs.msg import CompressedImage
+
+    color, depth, info = messages
+    shape = color.height, color.width
+    picture = np.frombuffer(color.data, np.uint8).reshape(*shape, 3)
+    millimetres = np.frombuffer(depth.data, np.uint16).reshape(shape)
+    jpeg = cv2.imencode('.jpg', picture, (cv2.IMWRITE_JPEG_QUALITY, 95))[1].tobytes()
+    png = bytes(12) + cv2.imencode('.png', millimetres)[1].tobytes()
+    return (
+        CompressedImage(format='bgr8; jpeg compressed bgr8', data=array.array('B', jpeg)),
+        CompressedImage(format='16UC1; compressedDepth png', data=array.array('B', png)),
+        info,
+    )
 
 
 if __name__ == '__main__':

@@ -1,0 +1,44 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The commands that measure the live node, shortened; what is asserted holds on busy machines."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+from rgbd_kcf_tracker.ros import benchmark, soak
+
+pytestmark = pytest.mark.ros
+
+
+def test_benchmark_measures_a_live_camera(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / 'live.json'
+    benchmark.main(['--sizes', 'qhd', '--seconds', '3', '--output', str(output)])
+    (result,) = json.loads(output.read_text())
+    assert result['sent'] == 120
+    assert result['received'] >= 115
+    assert result['processed'] + result['dropped'] == result['received']
+    assert result['boxes'] >= 0.9 * result['processed'] > 0
+    assert 0 < result['median_ms'] <= result['p95_ms'] <= result['p99_ms'] <= result['max_ms']
+    assert sum(result['histogram']) == result['processed'] - benchmark.WARM_UP
+    assert 0 < result['cpu_cores'] < 2
+    printed = capsys.readouterr().out
+    assert '| qhd 960x540 | 30 | 120 |' in printed
+    assert 'stamp to box' in printed
+
+
+def test_soak_shortened(tmp_path: Path) -> None:
+    output = tmp_path / 'soak.json'
+    soak.main(['--frames', '1000', '--output', str(output)])
+    result = json.loads(output.read_text())
+    assert result['answered'] == result['sent'] == 1000
+    assert result['boxes'] > 900
+    assert result['end_mb'] - result['settled_mb'] < soak.GROWTH_MB
