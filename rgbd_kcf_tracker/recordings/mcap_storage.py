@@ -20,7 +20,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.records import Channel, Schema
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.compression import unpack
+from rgbd_kcf_tracker.recordings.compression import Unpacker, unpack
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -115,7 +115,7 @@ class McapStorage:
         chunk, at, length = where
         data = self._file.read(at, length) if chunk < 0 else self._unpacked(chunk)[at : at + length]
         if len(data) != length:
-            raise RecordingError(f'{self.path} became shorter while it was read')
+            raise RecordingError(f'{self.path} is damaged, or became shorter while it was read')
         return data
 
     def close(self) -> None:
@@ -124,7 +124,12 @@ class McapStorage:
         self._cache.clear()
 
     def _record(
-        self, opcode: int, source: _File | _Memory, body: int, length: int, chunk: int | None
+        self,
+        opcode: int,
+        source: _File | _Memory | Unpacker,
+        body: int,
+        length: int,
+        chunk: int | None,
     ) -> Scanned | None:
         if opcode == _MESSAGE:
             return self._message(source, body, length, chunk)
@@ -133,12 +138,14 @@ class McapStorage:
         return None
 
     def _message(
-        self, source: _File | _Memory, body: int, length: int, chunk: int | None
+        self, source: _File | _Memory | Unpacker, body: int, length: int, chunk: int | None
     ) -> Scanned | None:
         start = _MESSAGE_HEAD.size
         if length < start:
             return None
         head = source.read(body, min(start + HEAD, length))
+        if len(head) < start:
+            return None
         channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(head)
         if channel not in self._channels:
             return None
@@ -157,23 +164,33 @@ class McapStorage:
         except (struct.error, UnicodeDecodeError):
             return
         data = body + at + 8
+        whole = packed <= available - at - 8
         packed = min(packed, available - at - 8)
         if method == '':
             yield from self._inside(self._file, data, data + packed, None)
             return
         self._chunks[body] = (method, data, packed, size)
         try:
-            memory = _Memory(self._unpacked(body))
+            memory: _Memory | Unpacker
+            if whole:
+                # Of the last message, mostly an image, the first bytes will do.
+                memory = Unpacker(method, self._file.read(data, packed), size)
+            else:
+                memory = _Memory(self._unpacked(body))
+            yield from self._inside(memory, 0, memory.size, body)
         except RecordingError as error:
-            self.warnings.append(f'{self.path}: a chunk at byte {body} is left out: {error}')
-            return
-        yield from self._inside(memory, 0, memory.size, body)
+            self.warnings.append(
+                f'{self.path}: the chunk at byte {body} is damaged, and read up to there: {error}'
+            )
 
     def _inside(
-        self, source: _File | _Memory, at: int, end: int, chunk: int | None
+        self, source: _File | _Memory | Unpacker, at: int, end: int, chunk: int | None
     ) -> Iterator[Scanned]:
         while at + _RECORD.size <= end:
-            opcode, length = _RECORD.unpack(source.read(at, _RECORD.size))
+            head = source.read(at, _RECORD.size)
+            if len(head) < _RECORD.size:
+                return
+            opcode, length = _RECORD.unpack(head)
             body = at + _RECORD.size
             at = body + length
             if at > end:

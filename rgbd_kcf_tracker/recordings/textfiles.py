@@ -13,7 +13,6 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
-
 # ROS stamps hold 32 bits of seconds.
 _LAST_STAMP_NS = (1 << 31) * 1_000_000_000
 
