@@ -116,3 +116,21 @@ def test_mistakes_are_explained(
     assert run(*words) == 2
     assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_contact_sheet(tmp_path: Path) -> None:
+    import cv2
+
+    path = tmp_path / 'sheet.png'
+    scenes = ['--scenario', 'behind_box', '--scenario', 'missing_depth', '--scenario', 'no_depth']
+    assert run('--contact-sheet', path, *scenes, *SMALL) == 0
+    sheet = cv2.imread(str(path))
+    assert sheet is not None
+    height, width = sheet.shape[:2]
+    assert width > 3 * 3 * 192
+    # green boxes of the visible part are drawn in every scene, in colour and in depth
+    green = np.all(sheet == (60, 230, 60), axis=2)
+    for tile in range(9):
+        assert green[:, tile * width // 9 : (tile + 1) * width // 9].any(), tile
+    assert height < 200
+    assert run('--contact-sheet', tmp_path / 'sheet.gif', *SMALL) == 2

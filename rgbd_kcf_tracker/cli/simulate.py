@@ -29,6 +29,7 @@ examples:
   rgbd-kcf simulate walk.mcap --scenario occlusion --seed 3
   rgbd-kcf simulate walk/ --scenario fast_motion --rate 5
   rgbd-kcf simulate scenes/ --scenario all --seed 100 --count 2
+  rgbd-kcf simulate --contact-sheet scenes.jpg --scenario all --rate 5
 """
 
 
@@ -80,6 +81,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=('mcap', 'folder'),
         help='of each scene when there are several (default: folder)',
     )
+    parser.add_argument(
+        '--contact-sheet',
+        type=Path,
+        metavar='FILE',
+        help='draw the scenes into one picture (.jpg or .png) instead of recording them',
+    )
     parser.add_argument('--overwrite', action='store_true', help='replace what is at DEST')
     parser.add_argument('--list', action='store_true', help='list the scenarios and stop')
     parser.add_argument(
@@ -105,8 +112,10 @@ def run(args: argparse.Namespace) -> int:
         for scenario in SCENARIOS.values():
             print(f'{scenario.name:{width}}  {scenario.description}')
         return 0
-    if args.dest is None:
-        raise ParameterError('DEST is missing: name an .mcap file or a folder to write (or --list)')
+    if (args.dest is None) == (args.contact_sheet is None):
+        raise ParameterError(
+            'name DEST, an .mcap file or a folder to write, or --contact-sheet FILE'
+        )
     if args.count < 1:
         raise ParameterError(f'--count is {args.count}: give 1 or more')
     names = list(dict.fromkeys(args.scenario or ['normal']))
@@ -116,6 +125,9 @@ def run(args: argparse.Namespace) -> int:
     for name in names:  # find every mistake before anything is written
         check_request(name, args.seed, args.rate, args.duration, size)
     jobs = [(name, seed) for name in names for seed in range(args.seed, args.seed + args.count)]
+    if args.contact_sheet is not None:
+        _draw_sheet(args, jobs, size)
+        return 0
     for dest, (name, seed) in zip(_destinations(args, jobs), jobs, strict=True):
         _prepare(dest, args.overwrite)
         sequence = simulate(name, seed, args.rate, args.duration, size)
@@ -124,6 +136,30 @@ def run(args: argparse.Namespace) -> int:
         else:
             _record(sequence, dest, lambda path: _folder(path, args.color_format))
     return 0
+
+
+def _draw_sheet(
+    args: argparse.Namespace, jobs: list[tuple[str, int]], size: tuple[int, int]
+) -> None:
+    import cv2
+
+    from rgbd_kcf_tracker.simulation import simulate
+    from rgbd_kcf_tracker.simulation.contact_sheet import contact_sheet
+
+    path: Path = args.contact_sheet
+    if path.suffix not in ('.jpg', '.png'):
+        raise ParameterError(f'{path} must end in .jpg or .png')
+    _prepare(path, args.overwrite)
+    scenes = (simulate(name, seed, args.rate, args.duration, size) for name, seed in jobs)
+    sheet = contact_sheet(progress(scenes, len(jobs), 'contact sheet'))
+    done, data = cv2.imencode(path.suffix, sheet, [int(cv2.IMWRITE_JPEG_QUALITY), 78])
+    if not done:
+        raise RecordingError(f'{path} cannot be encoded: fewer scenes make a smaller picture')
+    try:
+        path.write_bytes(data.tobytes())
+    except OSError as error:
+        raise RecordingError(f'cannot write {path}: {error.strerror}') from error
+    print(f'{path}: {len(jobs)} scenes')
 
 
 def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list[Path]:

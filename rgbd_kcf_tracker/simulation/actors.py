@@ -46,6 +46,10 @@ class PersonActor:
         return np.array([self.motion.value('x', t), -high * crouch * self.person.height,
                          self.motion.value('z', t)])  # fmt: skip
 
+    def shadow(self, t: float) -> float:
+        """See `Actor`."""
+        return 0.0 if self.parts == 'head' else 0.36
+
 
 @dataclass(frozen=True)
 class FacesActor:
@@ -90,14 +94,26 @@ class FacesActor:
         return np.array([self.motion.value('x', t), -lift - self.height / 2,
                          self.motion.value('z', t)])  # fmt: skip
 
+    def shadow(self, t: float) -> float:
+        """See `Actor`."""
+        return 0.36 if self.motion.value('lift', t) < 0.1 else 0.0
+
 
 @dataclass(frozen=True)
 class ThingActor:
-    """Any solids that follow a function of time."""
+    """Any solids that follow a function of time.
+
+    Attributes:
+        atlas: their textures.
+        shape: the solids in the world frame at a time.
+        middle: of the thing, world frame.
+        radius: of its shadow on the floor, 0 for what stands on something else.
+    """
 
     atlas: Atlas
     shape: Callable[[float], Solids]
     middle: Callable[[float], Vector]
+    radius: float = 0.0
 
     def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
@@ -107,6 +123,10 @@ class ThingActor:
     def centre(self, t: float) -> Vector:
         """See `Actor`."""
         return self.middle(t)
+
+    def shadow(self, t: float) -> float:
+        """See `Actor`: weaker the higher it flies."""
+        return max(0.0, self.radius - 0.5 * max(0.0, -float(self.middle(t)[1]) - self.radius))
 
 
 def ball(rng: np.random.Generator, motion: Motion, radius: float) -> ThingActor:
@@ -130,7 +150,7 @@ def ball(rng: np.random.Generator, motion: Motion, radius: float) -> ThingActor:
         out.ellipsoid(middle(t), pole * radius, radius, radius, 0, side)
         return out.pack()
 
-    return ThingActor(atlas, shape, middle)
+    return ThingActor(atlas, shape, middle, radius)
 
 
 def mug(
@@ -216,4 +236,4 @@ def animal(rng: np.random.Generator, motion: Motion, scale: float = 1.0) -> Thin
         )
         return out.pack()
 
-    return ThingActor(atlas, shape, middle)
+    return ThingActor(atlas, shape, middle, 0.36 * s)

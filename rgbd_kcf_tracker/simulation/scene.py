@@ -49,6 +49,9 @@ class Actor(Protocol):
     def centre(self, t: float) -> Vector:
         """A point in its middle, world frame, metres."""
 
+    def shadow(self, t: float) -> float:
+        """Radius of its shadow on the floor in metres, 0 for none."""
+
 
 def steady_light(_: float) -> Gain:
     """Light that never changes."""
@@ -257,13 +260,13 @@ class _Picture:
     def _cast_shadow(self, actor: Actor) -> None:
         """Darken the floor under an actor that stands on it."""
         foot = actor.centre(self.t).copy()
-        lift = max(0.0, -float(foot[1]) - 1.0)
+        radius = actor.shadow(self.t)
         foot[1] = 0.0
         p = self.view.rotation @ (foot - self.view.place)
-        if p[2] < 0.6 or lift > 0.5:
+        if p[2] < 0.6 or radius <= 0:
             return
         u, v = self.camera.project(*(float(c) for c in p))
-        rx = 0.36 * self.camera.fx / p[2]
+        rx = radius * self.camera.fx / p[2]
         ry = rx * float(np.clip(-self.view.place[1] / p[2], 0.15, 0.8))
         x0, x1 = int(max(0, u - rx)), int(min(self.width, u + rx + 1))
         y0, y1 = int(max(0, v - ry)), int(min(self.height, v + ry + 1))
