@@ -57,11 +57,12 @@ def strip(
         image: Picture = np.asarray(picture, np.uint8)
         _dashed(image, truth[i] * scale)
         missing = []
-        for name, own in boxes.items():
+        for n, (name, own) in enumerate(boxes.items()):
             if np.isnan(own[i, 0]):
                 missing.append(name)
-            else:
-                _rectangle(image, own[i] * scale, _bgr(palette[name]))
+            else:  # thinner and thinner, so that boxes on top of each other are all seen
+                thickness = max(1, min(len(boxes), 5) - n)
+                _rectangle(image, own[i] * scale, _bgr(palette[name]), thickness)
         _label(image, f'{i}', missing, palette, np.isnan(truth[i, 0]))
         tiles.append(image)
     if not tiles:
@@ -104,9 +105,9 @@ def _montage(tiles: list[Picture]) -> Picture:
     return sheet
 
 
-def _rectangle(image: Picture, box: Array, color: tuple[int, int, int]) -> None:
+def _rectangle(image: Picture, box: Array, color: tuple[int, int, int], thickness: int) -> None:
     x, y, width, height = (round(float(v)) for v in box)
-    cv2.rectangle(image, (x, y), (x + width, y + height), color, 2, cv2.LINE_AA)
+    cv2.rectangle(image, (x, y), (x + width, y + height), color, thickness, cv2.LINE_AA)
 
 
 def _dashed(image: Picture, box: Array) -> None:

@@ -17,7 +17,6 @@ from enum import IntEnum
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import gaussian_kde
 
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 
@@ -153,7 +152,9 @@ def typical_lengths(lengths: Sequence[int]) -> tuple[int, int]:
     if shortest == longest:
         return shortest, longest
     grid = np.arange(1, 2 * longest + 1)
-    density = gaussian_kde(np.asarray(lengths, np.float64))(grid)
+    bandwidth = float(np.std(lengths, ddof=1)) * len(lengths) ** -0.2  # Scott's rule
+    distance = (grid[:, None] - np.asarray(lengths, np.float64)[None, :]) / bandwidth
+    density = np.exp(-(distance**2) / 2).sum(axis=1)
     density /= density.sum()
     low = high = int(np.argmax(density))
     mass = density[low]
