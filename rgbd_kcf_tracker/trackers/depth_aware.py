@@ -25,7 +25,7 @@ class DepthParameters(KcfParameters):
     """What ``rgbd`` and ``rgbd_pf`` share beyond the correlation filter."""
 
     depth_threshold: float = parameter(
-        0.2,
+        0.15,
         "Difference of the centre depth patches above which the target is hidden (the thesis's "
         'threshold, theta).',
         unit='m',
@@ -174,12 +174,16 @@ class DepthAwareTracker(ABC):
     def _plausible(self, frame: Frame, found: Detection) -> bool:
         """Whether what responds could be the target found again, by its depth.
 
-        The template has one size, so what looks like it at another distance is not the target.
+        The template has one size, so what looks like it at another distance is not the target; and
+        where the frame has depth but none there, as beyond the depth camera's view, it may be
+        anything.
         """
-        difference = self._diff_at_centre(frame, self._box_at(found), 0.0)
         depth = self._depth_patch.depth
-        if difference is None or depth is None:
+        if frame.depth is None or depth is None:
             return True
+        difference = self._diff_at_centre(frame, self._box_at(found), 0.0)
+        if difference is None:
+            return False
         return abs(difference.distance / depth - 1) <= self._depth_parameters.depth_change
 
     def _see(
@@ -194,14 +198,15 @@ class DepthAwareTracker(ABC):
         A response can still be high, or the depth not yet too different, when an occluder covers a
         part of the centre: the less is learned, the more the depth differs.
         """
-        trust = 1.0 if self._hidden else self._trust(difference, found.response)
+        again = self._hidden
+        trust = 1.0 if again else self._trust(difference, found.response)
         self._hidden = False
         self._seen_ns = frame.stamp_ns
         self._box = self._box_at(found)
         model.train(frame, self._box.cx, self._box.cy, trust)
         if frame.depth is None:
             return
-        if trust >= 0.5 and found.response >= self._high:
+        if again or (trust >= 0.5 and found.response >= self._high):
             patch = centre_patch(frame.depth, self._box, self._depth_parameters.center_share)
             self._depth_patch.remember(patch)
         elif difference is not None:

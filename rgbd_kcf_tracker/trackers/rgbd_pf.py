@@ -40,7 +40,7 @@ _UNLIKE = 0.7
 # Share of the particles thrown anywhere in each frame while the target is lost.
 _SCATTER = 0.5
 # Seconds of walking by which a target found again may have changed its depth unseen.
-_UNSEEN_S = 0.5
+_UNSEEN_S = 0.15
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,13 @@ class RgbdPfParameters(DepthParameters):
         minimum=0.0,
         maximum=1.0,
         source=_THESIS,
+    )
+    reacquire_threshold: float = parameter(
+        0.45,
+        'Response above which a hidden target is found again where the depth is its own.',
+        minimum=0.0,
+        maximum=1.0,
+        source='between the two of thesis Algorithm 2',
     )
     particles: int = parameter(200, 'Number of particles.', minimum=10, maximum=20000)
     color_bins: int = parameter(
@@ -209,7 +216,9 @@ class RgbdPfTracker(DepthAwareTracker):
         self._particles.resample(self._parameters.resample_below)
         places.append((self._box.cx, self._box.cy))
         found = self._detect_at(frame, model, places)
-        if found.response < self._low or not self._plausible(frame, found):
+        if found.response < self._parameters.reacquire_threshold or not self._plausible(
+            frame, found
+        ):
             return None
         difference = self._diff_at_centre(frame, self._box_at(found), _UNSEEN_S)
         if found.response < self._high and self._occlusion_status(difference, found.response):
