@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import signal
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -257,4 +258,32 @@ def test_compressed_chunks(tmp_path: Path, compression: str) -> None:
     assert status == 0, output
     assert [bytes(m.data) for m in heard.colors] == [
         made.frame.color.tobytes() for made in rig.frames()
+    ]
+
+
+def test_lockstep_over_streams_of_different_rates(tmp_path: Path) -> None:
+    """Depth with every third colour image, and colour at an odd offset: every image is answered."""
+    path = tmp_path / 'rates.mcap'
+    with rig.BagWriter(path, rig.GENERIC) as bag:
+        for number, made in enumerate(rig.frames()[:30]):
+            frame = made.frame
+            if number % 3:
+                frame = replace(frame, depth=None)
+            bag.write_frame(frame)
+    report = tmp_path / 'report.json'
+    with (
+        rig.Listener() as heard,
+        rig.running_tracker(
+            tmp_path, variant='kcf', init_box=rig.box_text(rig.first_box()), queue_policy='all'
+        ),
+    ):
+        heard.await_tracker()
+        status, output = rig.run_replay(tmp_path, bag=str(path), lockstep=True, report=str(report))
+    assert status == 0, output
+    figures = json.loads(report.read_text())
+    assert (figures['color_images'], figures['depth_images']) == (30, 10)
+    assert figures['pairs'] == figures['answers'] == 30
+    assert figures['sent_again'] == 0
+    assert [stamp_to_ns(m.header.stamp) for m in heard.boxes] == [
+        made.frame.stamp_ns for made in rig.frames()[:30]
     ]
