@@ -62,11 +62,11 @@ class RgbdPfParameters(DepthParameters):
         source=_THESIS,
     )
     reacquire_threshold: float = parameter(
-        0.45,
+        0.4,
         'Response above which a hidden target is found again where the depth is its own.',
         minimum=0.0,
         maximum=1.0,
-        source='between the two of thesis Algorithm 2',
+        source='between 0.3 and 0.6 of thesis Algorithm 2',
     )
     particles: int = parameter(200, 'Number of particles.', minimum=10, maximum=20000)
     color_bins: int = parameter(
