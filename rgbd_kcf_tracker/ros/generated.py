@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rgbd_kcf_tracker.parameters import ParameterInfo, Scalar, describe
+from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.ros.settings import READ_ONLY, NodeParameters
 from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, VARIANTS
 
@@ -109,6 +110,14 @@ def parameters_markdown() -> str:
         default = ' (the default variant)' if name == DEFAULT_VARIANT else ''
         lines += ['', f'## `{name}`{default}', '', f'{variant.summary}.', '']
         lines += _table(f'{name}.', describe(variant.parameters))
+    lines += [
+        '',
+        '# Parameters of the replay node',
+        '',
+        'All are read when it starts; a value that it cannot use ends it with a message.',
+        '',
+        *_table('', describe(ReplayParameters)),
+    ]
     return '\n'.join(lines) + '\n'
 
 
