@@ -88,6 +88,7 @@ def test_track_writes_csv_video_and_bag(
     summary = capsys.readouterr().out
     assert summary.startswith('square: 12 frames with kcf: 12 tracking; ')
     assert str(out['csv']) in summary
+    assert 'success 1.000' in summary
     found = rows(out['csv'])
     assert [int(r['frame']) for r in found] == list(range(12))
     assert [int(r['stamp_ns']) for r in found] == [n * 33_333_333 for n in range(12)]
@@ -219,6 +220,13 @@ def test_a_box_outside_the_image_leaves_no_files(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_success_is_only_told_of_the_target_of_the_ground_truth(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['track', str(folder), '--init', '100,5,40,30']) == 0
+    assert 'success' not in capsys.readouterr().out
+
+
 def test_bad_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for command in (['track'], ['info'], ['convert']):
         dest = [tmp_path / 'out.mcap'] if command == ['convert'] else []
@@ -342,6 +350,19 @@ def test_info(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     text = capsys.readouterr().out
     assert 'cannot be tracked as it is' in text
     assert COLOR in text
+
+
+def test_info_checks_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_folder(tmp_path / 'a')
+    assert main(['info', str(source), '--check']) == 0
+    assert 'checked       12 frames, 0 damaged' in capsys.readouterr().out
+    (source / 'rgb' / '000004.png').write_bytes(b'no image')
+    (source / 'depth' / '000006.png').write_bytes(b'no image')
+    assert main(['info', str(source), '--check']) == 1
+    text = capsys.readouterr().out
+    assert 'checked       12 frames, 1 damaged' in text
+    assert 'damaged: ' in text
+    assert '000006.png' in text
 
 
 def run_program(*arguments: object, **options: Any) -> subprocess.Popen[str]:

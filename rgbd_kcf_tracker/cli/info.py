@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
+import time
 from typing import TYPE_CHECKING, Any
 
-from rgbd_kcf_tracker.cli.common import SOURCE_HELP, add_reading_options, read_options
+from rgbd_kcf_tracker.cli.common import SOURCE_HELP, add_reading_options, progress, read_options
+from rgbd_kcf_tracker.errors import RgbdKcfError
 
 if TYPE_CHECKING:
-    from rgbd_kcf_tracker.recordings import RecordingInfo, StreamInfo
+    from rgbd_kcf_tracker.recordings import ReadOptions, RecordingInfo, StreamInfo
 
 NAME = 'info'
 HELP = 'say what is in a recording: topics, rates, sizes, encodings, camera, ground truth'
@@ -22,16 +25,49 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
     parser.add_argument('source', metavar='SOURCE', help=SOURCE_HELP)
     parser.add_argument('--json', action='store_true', help='for programs')
+    parser.add_argument(
+        '--check',
+        action='store_true',
+        help='decode every frame: what is damaged, and how fast it is',
+    )
     add_reading_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it; the exit code is 0 also where the recording holds no frames that can be read."""
+    """Print it; the exit code is 1 where ``--check`` finds frames that cannot be read, else 0."""
     from rgbd_kcf_tracker.recordings.opening import describe_recording
 
-    info = describe_recording(args.source, read_options(args))
+    options = read_options(args)
+    info = describe_recording(args.source, options)
     print(json.dumps(_as_dict(info), indent=2) if args.json else _as_text(info))
-    return 0
+    return _check(args, options) if args.check and not info.problem else 0
+
+
+def _check(args: argparse.Namespace, options: ReadOptions) -> int:
+    """Decode each frame by itself, so that one that is damaged does not hide the next."""
+    from rgbd_kcf_tracker.recordings import open_recording
+
+    out = sys.stderr if args.json else sys.stdout
+    damaged = 0
+    with open_recording(args.source, options) as recording:
+        told = len(recording.warnings)
+        begun = time.perf_counter()
+        for number in progress(range(len(recording)), len(recording), 'check'):
+            try:
+                for _ in recording.frames(number, number + 1):
+                    pass
+            except RgbdKcfError as error:
+                damaged += 1
+                print(f'damaged: {error}', file=out)
+        spent = time.perf_counter() - begun
+        for warning in recording.warnings[told:]:
+            print(f'warning: {warning}', file=out)
+        rate = len(recording) / spent if spent else 0.0
+        print(
+            f'checked       {len(recording)} frames, {damaged} damaged, {rate:.0f} frames/s',
+            file=out,
+        )
+    return 1 if damaged else 0
 
 
 def _as_text(info: RecordingInfo) -> str:

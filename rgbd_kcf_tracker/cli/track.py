@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 NAME = 'track'
 HELP = 'follow one target through a recording and write where it is'
+_SAME_TARGET_IOU = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,6 +82,7 @@ def run(args: argparse.Namespace) -> int:
         warnings.show()
         box, first = _first_box(given, recording, start, end)
         counts: Counter[str] = Counter()
+        boxes: list[Box | None] = []
         spent = 0.0
         sinks: _Sinks | None = None
         with ExitStack() as stack:
@@ -95,16 +97,35 @@ def run(args: argparse.Namespace) -> int:
                 track = tracker.start(frame, box) if number == first else tracker.update(frame)
                 spent += time.perf_counter() - begun
                 counts[track.state.value] += 1
+                boxes.append(track.box)
                 sinks.write(number, frame, track)
                 warnings.show()
-    total = sum(counts.values())
-    rate = total / spent if spent > 0 else 0.0
+        success = _success(boxes[first - start :], recording, first, box)
+    rate = len(boxes) / spent if spent > 0 else 0.0
     states = ', '.join(f'{count} {state}' for state, count in counts.items())
-    line = f'{recording.name}: {total} frames with {variant}: {states}; {rate:.0f} frames/s'
+    line = f'{recording.name}: {len(boxes)} frames with {variant}: {states}{success}'
+    line += f'; {rate:.0f} frames/s'
     if sinks is not None and sinks.written:
         line += f'; wrote {", ".join(sinks.written)}'
     print(line, file=sys.stderr if args.output == '-' else sys.stdout)
     return 0
+
+
+def _success(boxes: list[Box | None], recording: Recording, first: int, start: Box) -> str:
+    """How the boxes compare with the ground truth, if that is of the same target."""
+    if recording.groundtruth is None:
+        return ''
+    truth = recording.groundtruth[first : first + len(boxes)]
+    if len(truth) < 2 or truth[0] is None or truth[0].iou(start) < _SAME_TARGET_IOU:
+        return ''
+    from rgbd_kcf_tracker.evaluation.metrics import measure_boxes
+
+    body = recording.groundtruth_body
+    bodies = None if body is None else body[first : first + len(truth)]
+    if bodies is not None and len(bodies) < len(truth):
+        bodies = None
+    measures = measure_boxes(boxes[: len(truth)], truth, bodies)
+    return f'; success {measures.success:.3f}, IoU {measures.iou:.3f} against the ground truth'
 
 
 class _Sinks:
@@ -135,7 +156,8 @@ class _Sinks:
         if self.csv is not None:
             self.csv.write_track(number, frame.stamp_ns, track)
         if self.video is not None:
-            self.video.write_track(frame, track, truth, f'frame {number}')
+            words = f'frame {number}' + ('' if truth is None else '   truth white')
+            self.video.write_track(frame, track, truth, words)
         if self.bag is not None:
             self.bag.write_frame(frame)
             if annotated:
