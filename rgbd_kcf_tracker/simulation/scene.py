@@ -236,7 +236,8 @@ class _Picture:
             if i == 0:
                 self.body = layer
             if layer is not None:
-                layers.append((float(np.median(layer.z[layer.mask])), i, layer))
+                middle = self.view.rotation @ (actor.centre(t) - self.view.place)
+                layers.append((float(middle[2]), i, layer))
         if shade:
             for _, i, _ in layers:
                 self._cast_shadow(self.scene.actors[i])
@@ -295,7 +296,7 @@ class _Picture:
             actor = self.scene.actors[index]
             half = self.scene.sensor.exposure_s / 2
             dx, dy = self._streak(actor.centre(self.t - half), actor.centre(self.t + half))
-            if max(abs(dx), abs(dy)) > 1.5:
+            if max(abs(dx), abs(dy)) > 2:
                 self._smear(layer, distance, (dx, dy))
             else:
                 cv2.copyTo(layer.color[part], nearer.view(np.uint8), self.color[window])

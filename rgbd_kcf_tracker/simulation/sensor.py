@@ -156,7 +156,8 @@ class Sensor:
         bad |= self._holes[self._cut(rng)]
         small = cv2.resize(color, self.small, interpolation=cv2.INTER_NEAREST)
         # black hair and cloth fall out in part, the more the farther
-        bad |= (small.max(axis=2) < 30) & (chance < np.float32(0.05) * z)
+        dark = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY) < 26
+        bad |= dark & (chance < np.float32(0.05) * z)
         # beyond 4.5 m readings fall out more and more, beyond 8 m there are none
         bad |= (z - np.float32(4.5)) > np.float32(3.5) * np.sqrt(np.sqrt(chance))
         if self.options.narrow:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -203,33 +204,31 @@ def render(
 
     depth = np.full((y1 - y0, x1 - x0), np.inf, np.float32)
     which = np.full(depth.shape, -1, np.int16)
-    for i in np.flatnonzero(draw):
-        c0, r0, c1, r1 = boxes[i]
-        cols, rows = slice(c0 - x0, c1 - x0), slice(r0 - y0, r1 - y0)
-        xs, ys = x[cols], y[rows]
-        m, h, c = quad[i].astype(np.float32), half[i].astype(np.float32), np.float32(const[i])
-        if c <= 0:  # the camera is inside
-            continue
-        linear = (h[0] * xs) + (h[1] * ys + h[2])
-        a = (2 * m[0, 1]) * ys * xs
-        a += (m[0, 0] * xs + 2 * m[0, 2]) * xs + m[2, 2]
-        a += (m[1, 1] * ys + 2 * m[1, 2]) * ys
-        root = linear * linear
-        a *= c
-        root -= a
-        hit = root > 0
-        np.sqrt(np.maximum(root, 0, out=root), out=root)
-        root -= linear  # near root: c / (sqrt(disc) - linear)
-        hit &= root > 0
-        z = np.divide(c, root, out=np.full_like(root, np.inf), where=hit)
-        if not solids.ellipsoid[i]:
-            n = inverse[i, 1].astype(np.float32)
-            along = np.multiply(n[0] * xs + (n[1] * ys + n[2]), z, where=hit, out=root)
-            along += np.float32(b[i, 1])
-            hit &= (along >= 0) & (along <= 1)
-        hit &= z < depth[rows, cols]
-        np.copyto(depth[rows, cols], z, where=hit)
-        np.copyto(which[rows, cols], np.int16(i), where=hit)
+    # the discriminant, half^2 - const * quad, is a quadratic form of the ray (x, y, 1)
+    form = half[:, :, None] * half[:, None, :] - const[:, None, None] * quad
+    form32, half32, along32 = (v.astype(np.float32) for v in (form, half, inverse[:, 1]))
+    with np.errstate(invalid='ignore', divide='ignore'):  # where a ray misses, z is NaN
+        for i in np.flatnonzero(draw & (const > 0)):  # else the camera is inside
+            c0, r0, c1, r1 = boxes[i]
+            cols, rows = slice(c0 - x0, c1 - x0), slice(r0 - y0, r1 - y0)
+            xs, ys = x[cols], y[rows]
+            e, h, n = form32[i], half32[i], along32[i]
+            z = (2 * e[0, 1]) * ys * xs
+            z += (e[0, 0] * xs + 2 * e[0, 2]) * xs + e[2, 2]
+            z += (e[1, 1] * ys + 2 * e[1, 2]) * ys
+            np.sqrt(z, out=z)
+            z -= h[0] * xs + (h[1] * ys + h[2])
+            np.divide(np.float32(const[i]), z, out=z)  # the nearer root
+            hit = z < depth[rows, cols]
+            hit &= z > 0
+            if not solids.ellipsoid[i]:
+                along = n[0] * xs + (n[1] * ys + n[2])
+                along *= z
+                low = np.float32(-b[i, 1])
+                hit &= along >= low
+                hit &= along <= low + 1
+            np.copyto(depth[rows, cols], z, where=hit)
+            np.copyto(which[rows, cols], np.int16(i), where=hit)
     rows_hit = np.flatnonzero((which >= 0).any(1))
     cols_hit = np.flatnonzero((which >= 0).any(0))
     if rows_hit.size == 0:
@@ -250,34 +249,44 @@ def _shade(
     atlas: Atlas, light: Lighting,
 ) -> None:  # fmt: skip
     """Texture and light every pixel that shows a solid."""
-    flat = np.flatnonzero(which.ravel() >= 0)
-    i = which.ravel()[flat]
+    shown = which.ravel()
+    flat = np.argsort(shown, kind='stable')  # radix sort: each solid's pixels lie together
+    counts = np.bincount(shown + 1, minlength=len(b) + 1)
+    flat = flat[counts[0] :]
+    counts = counts[1:]
     row, col = np.divmod(flat.astype(np.int32), np.int32(which.shape[1]))
-    z = depth.ravel()[flat]
     point = np.empty((3, len(flat)), np.float32)
-    np.multiply(x[col], z, out=point[0])
-    np.multiply(y[row], z, out=point[1])
-    point[2] = z
-    n = inverse.astype(np.float32)[i]  # (m, 3, 3)
-    q = np.einsum('mij,jm->im', n, point)
-    q += b.astype(np.float32)[i].T
-    around = np.arctan2(q[0], -q[2])
+    np.take(depth.ravel(), flat, out=point[2])
+    np.multiply(x[col], point[2], out=point[0])
+    np.multiply(y[row], point[2], out=point[1])
+    matrices, offsets = inverse.astype(np.float32), b.astype(np.float32)[:, :, None]
+    tapers = solids.taper.astype(np.float32)
+    around, along = np.empty((2, len(flat)), np.float32)
+    normal = np.empty_like(point)
+    end = 0
+    for i in np.flatnonzero(counts):
+        start, end = end, end + int(counts[i])
+        q = matrices[i] @ point[:, start:end]
+        q += offsets[i]
+        around[start:end] = cv2.phase(-q[2], q[0])[:, 0]
+        if solids.ellipsoid[i]:
+            along[start:end] = q[1] * np.float32(0.5) + np.float32(0.5)
+        else:
+            along[start:end] = q[1]
+            q[1] = -tapers[i] * (1 + tapers[i] * q[1])  # now the gradient
+        normal[:, start:end] = matrices[i].T @ q
     around *= np.float32(1 / (2 * np.pi))
     around += np.float32(0.5)
-    ball = solids.ellipsoid[i]
-    along = np.where(ball, (q[1] + 1) * np.float32(0.5), q[1])
-    texture = solids.texture[i]
+    around -= np.floor(around)  # the front (-z) in the middle
+    texture = np.repeat(solids.texture, counts)
     w, h = atlas.widths[texture], atlas.heights[texture]
     u = np.clip((around * w).astype(np.int32), 0, w - 1)
     v = np.clip((along * h).astype(np.int32), 0, h - 1)
     texel = atlas.texels[atlas.offsets[texture] + v * w + u]
-    taper = solids.taper.astype(np.float32)[i]
-    q[1] = np.where(ball, q[1], -taper * (1 + taper * q[1]))  # now the local gradient
-    normal = np.einsum('mij,im->jm', n, q)
     size = np.sqrt(np.einsum('jm,jm->m', normal, normal)) + np.float32(1e-9)
-    lit = np.float32(light.direction) @ normal
+    lit = light.direction.astype(np.float32) @ normal
     lit /= size
     lit *= np.float32(light.diffuse * 0.5)
     lit += np.float32(light.ambient + light.diffuse * 0.5)
     texel *= lit[:, None]
-    color.reshape(-1, 3)[flat] = np.clip(texel, 0, 255).astype(np.uint8)
+    color.reshape(-1, 3)[flat] = np.clip(texel, 0, 255, out=texel).astype(np.uint8)
