@@ -256,6 +256,25 @@ def test_boxes_and_images_of_every_kind(variant: str, first: Box) -> None:
 
 
 @pytest.mark.parametrize('variant', VARIANTS)
+def test_a_stream_that_changes_size_is_followed_on(variant: str) -> None:
+    tracker = create_tracker(variant)
+    tracker.start(frame(100, 0), box(100))
+    for index in range(1, 30):
+        x = 100 + 4 * index
+        now = frame(x, index)
+        if index > 10:
+            assert now.depth is not None
+            color = cv2.resize(now.color, (2 * WIDTH, 2 * HEIGHT))
+            depth = np.repeat(np.repeat(now.depth, 2, 0), 2, 1)
+            now = Frame(color, depth, now.stamp_ns)
+        track = tracker.update(now)
+        assert track.box is not None
+        scale = 2 if index > 10 else 1
+        truth = Box(scale * x, scale * 90, scale * TARGET[0], scale * TARGET[1])
+        assert track.box.iou(truth) > 0.7
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
 def test_bad_input_is_refused(variant: str) -> None:
     with pytest.raises(RgbdKcfError, match='outside'):
         create_tracker(variant).start(frame(0, 0), Box(900, 0, 5, 5))

@@ -119,6 +119,12 @@ class ParticleFilter:
         self.states[:count, [WIDTH, HEIGHT]] = box.width, box.height
         self.weights[:] = 1 / len(self.weights)
 
+    def rescale(self, across: float, down: float, noise: ProcessNoise) -> None:
+        """See the same scene in an image whose sides are that many times as long."""
+        self.states[:, [X, VX, WIDTH]] *= across
+        self.states[:, [Y, VY, HEIGHT]] *= down
+        self._noise = noise
+
     def predict(self, interval: float) -> None:
         """Propagate every particle by the prediction model.
 

@@ -39,6 +39,8 @@ _THESIS = 'thesis Algorithm 2'
 _UNLIKE = 0.7
 # Share of the particles thrown anywhere in each frame while the target is lost.
 _SCATTER = 0.5
+# Standard deviation of a position that the filter found, in target widths.
+_FOUND_SIGMA = 0.15
 # Seconds of walking by which a target found again may have changed its depth unseen.
 _UNSEEN_S = 0.15
 
@@ -125,15 +127,26 @@ class RgbdPfTracker(DepthAwareTracker):
 
     def _begin(self, frame: Frame) -> None:
         p, box = self._parameters, self._box
-        noise = ProcessNoise(
-            position=p.position_noise * box.width,
-            velocity=p.velocity_noise * box.width,
-            size=p.size_noise * box.width,
-            alpha=p.scale_noise,
-        )
-        self._particles = ParticleFilter(p.particles, noise, np.random.default_rng(p.seed))
+        self._particles = ParticleFilter(p.particles, self._noise(), np.random.default_rng(p.seed))
         self._initiate_particles(box)
         self._target_colors = self._histogram(frame.color, np.array([box.as_tuple()]))[0]
+
+    def _noise(self) -> ProcessNoise:
+        p, width = self._parameters, self._box.width
+        return ProcessNoise(
+            position=p.position_noise * width,
+            velocity=p.velocity_noise * width,
+            size=p.size_noise * width,
+            alpha=p.scale_noise,
+        )
+
+    def _rescale(self, frame: Frame, model: KcfModel) -> None:
+        """Carry the particles over too."""
+        before = self._box
+        super()._rescale(frame, model)
+        self._particles.rescale(
+            self._box.width / before.width, self._box.height / before.height, self._noise()
+        )
 
     def _follow(self, frame: Frame, model: KcfModel, interval: float) -> Detection | None:
         """Steps 6 to 21 of Algorithm 2; :meth:`_see` is step 4 for the next frame."""
@@ -148,29 +161,36 @@ class RgbdPfTracker(DepthAwareTracker):
             self._hidden = True
             return None
         estimate = self._estimate(frame)
-        there = self._detect_at(frame, model, [estimate])
-        found = self._decide(here, there, Detection(last.cx, last.cy, last.cx, last.cy, 0.0))
-        if found is not here:
-            difference = self._diff_at_centre(frame, self._box_at(found), interval)
+        there = self._detect_at(frame, model, [estimate])[0]
+        found = self._decide(here, there)
+        if found is None:
+            return self._hold(frame, here.response)
+        if found is there:
+            difference = self._diff_at_centre(frame, self._box_at(there), interval)
         self._see(frame, model, found, difference)
         self._observe(found)
         return found
 
-    def _decide(self, here: Detection, there: Detection, last: Detection) -> Detection:
-        """Steps 13 to 16: which position the responses speak for.
+    def _decide(self, here: Detection, there: Detection) -> Detection | None:
+        """Steps 13 to 16: which position the responses speak for; None for that of the last frame.
 
         Args:
             here: found about the last position (pos'_i).
             there: found about the particles' estimate (pos'_pf).
-            last: the last position itself (pos_{i-1}).
         """
         p = self._parameters
         if there.response > p.accept_threshold and there.response >= here.response:
             return there
         if max(here.response, there.response) >= p.hold_threshold:
             return here
+        return None
+
+    def _hold(self, frame: Frame, response: float) -> Detection:
+        """Step 16: keep the last position, start the particles there again, learn nothing."""
+        self._seen_ns = frame.stamp_ns
         self._initiate_particles(self._box)
-        return last
+        cx, cy = self._box.cx, self._box.cy
+        return Detection(cx, cy, cx, cy, response)
 
     def _estimate(self, frame: Frame) -> tuple[float, float]:
         """Steps 10 and 11: weigh the particles by colour; the centre of their mean."""
@@ -194,7 +214,7 @@ class RgbdPfTracker(DepthAwareTracker):
             states[:, X] + states[:, WIDTH] / 2 - found.cx,
             states[:, Y] + states[:, HEIGHT] / 2 - found.cy,
         )
-        self._particles.update(normal_likelihood(distance, self._box.width * 0.15))
+        self._particles.update(normal_likelihood(distance, self._box.width * _FOUND_SIGMA))
         self._particles.resample(self._parameters.resample_below)
 
     def _look_for_hidden(self, frame: Frame, model: KcfModel) -> Detection | None:
@@ -215,15 +235,22 @@ class RgbdPfTracker(DepthAwareTracker):
         ]
         self._particles.resample(self._parameters.resample_below)
         places.append((self._box.cx, self._box.cy))
-        found = self._detect_at(frame, model, places)
-        if found.response < self._parameters.reacquire_threshold or not self._plausible(
-            frame, found
-        ):
-            return None
+        candidates = self._detect_at(frame, model, places)
+        for found in sorted(candidates, key=lambda each: each.response, reverse=True):
+            if self._is_target(frame, found):
+                return self._found_again(frame, model, found)
+        return None
+
+    def _is_target(self, frame: Frame, found: Detection) -> bool:
+        """Whether what the filter found is the hidden target come out again."""
+        if found.response < self._parameters.reacquire_threshold:
+            return False
+        if not self._plausible(frame, found):
+            return False
+        if found.response >= self._parameters.accept_threshold:
+            return True
         difference = self._diff_at_centre(frame, self._box_at(found), _UNSEEN_S)
-        if found.response < self._high and self._occlusion_status(difference, found.response):
-            return None
-        return self._found_again(frame, model, found)
+        return not self._occlusion_status(difference, found.response)
 
     def _found_again(self, frame: Frame, model: KcfModel, found: Detection) -> Detection:
         self._see(frame, model, found, None)
@@ -232,17 +259,14 @@ class RgbdPfTracker(DepthAwareTracker):
 
     def _detect_at(
         self, frame: Frame, model: KcfModel, places: list[tuple[float, float]]
-    ) -> Detection:
-        """Step 12: the best that the filter or the first template finds about some centres."""
-        best: Detection | None = None
+    ) -> list[Detection]:
+        """Step 12: what the filter, or the first template, finds about each of some centres."""
+        found = []
         for cx, cy in places:
             sample = model.sample(frame, cx, cy)
             response = np.maximum(model.filter.respond(sample), model.first.respond(sample))
-            found = model.place(response, cx, cy)
-            if best is None or found.response > best.response:
-                best = found
-        assert best is not None
-        return best
+            found.append(model.place(response, cx, cy))
+        return found
 
     def _initiate_particles(self, box: Box) -> None:
         """Step 10: particles about a position, in any direction at a walk."""
