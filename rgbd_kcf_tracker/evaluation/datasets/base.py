@@ -164,5 +164,5 @@ def group(path: Path) -> str:
     ``occlusion_3`` belongs to ``occlusion``, as ``rgbd-kcf simulate`` names its scenes; any other
     recording to the folder that it lies in.
     """
-    numbered = re.fullmatch(r'(.+?)[_-]\d+', path.stem)
+    numbered = re.fullmatch(r'(.+)_\d+', path.stem)
     return numbered[1] if numbered else path.resolve().parent.name
