@@ -45,7 +45,8 @@ def ball_scene(*, sensor: SensorOptions = CLEAN, x: float = 0.2, z: float = 2.0)
 
 
 def record(scene: Scene, size: tuple[int, int] = (960, 540)) -> SimulatedSequence:
-    return SimulatedSequence(scene, 'test', 0, 30.0, 1.0, size, kinect2_intrinsics(size))
+    offsets = [round(k * 1e9 / 30) for k in range(30)]
+    return SimulatedSequence(scene, 'test', 0, 30.0, offsets, size, kinect2_intrinsics(size))
 
 
 def sphere_box(x: float, z: float, radius: float, size: tuple[int, int]) -> Box:
@@ -323,6 +324,26 @@ def test_sensor_noise_has_the_asked_strength() -> None:
     assert noisy.std() == pytest.approx(4, rel=0.15)
     assert noisy.mean() == pytest.approx(120, abs=0.5)
     assert sensor.color(flat, (0.5, 1, 1), np.random.default_rng(1))[..., 0].mean() < 62
+
+
+def test_irregular_stamps_show_the_same_world() -> None:
+    regular = simulate('crossing', seed=3, size=SMALL)
+    sequence = simulate('crossing', seed=3, size=SMALL, irregular=True)
+    stamps = np.array([sequence.stamp_ns(i) for i in range(len(sequence))])
+    steps = np.diff(stamps) * 30e-9
+    assert 0.7 * len(regular) < len(sequence) < len(regular)
+    assert steps.min() > 0.4
+    assert steps.max() > 5  # a gap
+    assert 0.05 < np.std(steps[steps < 1.5]) < 0.4
+    assert sequence[0].truth == regular[0].truth
+    again = simulate('crossing', seed=3, size=SMALL, irregular=True)
+    assert [again.stamp_ns(i) for i in range(len(again))] == stamps.tolist()
+    later = int(np.argmax(steps)) + 1
+    near = int(np.argmin([abs(regular.stamp_ns(i) - stamps[later]) for i in range(len(regular))]))
+    box, other = sequence.truth(later).body, regular.truth(near).body
+    assert box is not None
+    assert other is not None
+    assert box.iou(other) > 0.8
 
 
 def test_indexing() -> None:

@@ -87,6 +87,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         help='draw the scenes into one picture (.jpg or .png) instead of recording them',
     )
+    parser.add_argument(
+        '--irregular',
+        action='store_true',
+        help='stamps that vary, lost frames and gaps, as of a camera on a busy machine',
+    )
     parser.add_argument('--overwrite', action='store_true', help='replace what is at DEST')
     parser.add_argument('--list', action='store_true', help='list the scenarios and stop')
     parser.add_argument(
@@ -130,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for dest, (name, seed) in zip(_destinations(args, jobs), jobs, strict=True):
         _prepare(dest, args.overwrite)
-        sequence = simulate(name, seed, args.rate, args.duration, size)
+        sequence = simulate(name, seed, args.rate, args.duration, size, args.irregular)
         if dest.suffix == '.mcap':
             _record(sequence, dest, lambda path: _bag(path, size, args.compression))
         else:
@@ -150,7 +155,9 @@ def _draw_sheet(
     if path.suffix not in ('.jpg', '.png'):
         raise ParameterError(f'{path} must end in .jpg or .png')
     _prepare(path, args.overwrite)
-    scenes = (simulate(name, seed, args.rate, args.duration, size) for name, seed in jobs)
+    scenes = (
+        simulate(name, seed, args.rate, args.duration, size, args.irregular) for name, seed in jobs
+    )
     sheet = contact_sheet(progress(scenes, len(jobs), 'contact sheet'))
     done, data = cv2.imencode(path.suffix, sheet, [int(cv2.IMWRITE_JPEG_QUALITY), 78])
     if not done:

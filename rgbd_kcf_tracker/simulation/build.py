@@ -53,7 +53,7 @@ def check_request(
 
 def simulate(
     scenario: str, seed: int = 0, rate_hz: float = 30.0, duration_s: float | None = None,
-    size: tuple[int, int] = QHD,
+    size: tuple[int, int] = QHD, irregular: bool = False,
 ) -> SimulatedSequence:  # fmt: skip
     """Set up a scene; its frames are rendered when asked for.
 
@@ -64,6 +64,8 @@ def simulate(
         duration_s: seconds to record; by default the scene's own length. Past its end the actors
             stand still.
         size: width and height of the picture in pixels.
+        irregular: stamps that vary by some tenths of the interval, lost frames and gaps, as of a
+            camera on a busy machine.
 
     Raises:
         ParameterError: where a name is unknown or a number out of range.
@@ -73,4 +75,18 @@ def simulate(
     rng = np.random.default_rng([seed, zlib.crc32(scenario.encode())])
     scene = SCENARIOS[scenario].build(Stage(rng, camera, size))
     length = scene.duration_s if duration_s is None else duration_s
-    return SimulatedSequence(scene, scenario, seed, rate_hz, length, size, camera)
+    offsets_ns = [round(k * 1e9 / rate_hz) for k in range(max(2, round(length * rate_hz)))]
+    if irregular:
+        offsets_ns = _disturbed(offsets_ns, rate_hz, np.random.default_rng([seed, 1]))
+    return SimulatedSequence(scene, scenario, seed, rate_hz, offsets_ns, size, camera)
+
+
+def _disturbed(offsets_ns: list[int], rate_hz: float, rng: np.random.Generator) -> list[int]:
+    """Late stamps, one frame in twenty lost, and two gaps of 0.2 to 0.6 s."""
+    times = np.array(offsets_ns, float)
+    times[1:] += rng.uniform(0, 0.4e9 / rate_hz, len(times) - 1)
+    keep = rng.uniform(size=len(times)) > 0.05
+    for start in rng.uniform(0.1, 0.9, 2) * times[-1]:
+        keep &= ~((times >= start) & (times < start + rng.uniform(0.2e9, 0.6e9)))
+    keep[[0, -1]] = True
+    return [round(t) for t in times[keep]]

@@ -60,7 +60,7 @@ def telling_moment(sequence: SimulatedSequence) -> int:
         box = truth.visible
         if box is None or first is None:
             continue
-        t = i / sequence.rate_hz
+        t = (sequence.stamp_ns(i) - sequence.stamp_ns(0)) * 1e-9
         value = 0.5 * abs(np.log(light(t)[1] / light(0)[1])) + 0.1 * (1 - first.iou(box))
         value += 1 - first.iou(Box.from_center(first.cx, first.cy, box.width, box.height))
         if any(a <= t < b for a, b in sequence.scene.sensor.no_target_depth):

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -137,15 +137,24 @@ class SimulatedSequence:
     """A recorded scene; frames are rendered when asked for.
 
     ``len()``, indexing and iteration give `SimulatedFrame`; any order gives the same frames.
+
+    Args:
+        scene: what happens.
+        scenario: its name.
+        seed: of the camera's noise.
+        rate_hz: frames per second.
+        offsets_ns: of each frame from the start of the scene.
+        size: width and height of the picture.
+        intrinsics: of the camera.
     """
 
     def __init__(
-        self, scene: Scene, scenario: str, seed: int, rate_hz: float, duration_s: float,
+        self, scene: Scene, scenario: str, seed: int, rate_hz: float, offsets_ns: Sequence[int],
         size: tuple[int, int], intrinsics: Intrinsics,
     ) -> None:  # fmt: skip
         self.scene, self.scenario, self.seed, self.rate_hz = scene, scenario, seed, rate_hz
         self.size, self.intrinsics = size, intrinsics
-        self._count = max(2, round(duration_s * rate_hz))
+        self._offsets_ns = tuple(offsets_ns)
         self._key = [seed, zlib.crc32(scenario.encode())]
         self._sensor = Sensor(
             scene.sensor, intrinsics, size, np.random.default_rng([*self._key, 7])
@@ -154,15 +163,15 @@ class SimulatedSequence:
 
     def __len__(self) -> int:
         """Number of frames."""
-        return self._count
+        return len(self._offsets_ns)
 
     def __iter__(self) -> Iterator[SimulatedFrame]:
         """Frames in order."""
-        return (self[i] for i in range(self._count))
+        return (self[i] for i in range(len(self)))
 
     def __getitem__(self, index: int) -> SimulatedFrame:
         """Render one frame."""
-        offset_ns = self._offset_ns(index)
+        offset_ns = self._offsets_ns[index]
         t = offset_ns * 1e-9
         rng = np.random.default_rng([*self._key, offset_ns // 1000])
         picture = _Picture(self, t)
@@ -175,20 +184,16 @@ class SimulatedSequence:
             depth = self._sensor.depth(
                 later.depth, picture.color, later.target_mask if blind else None, rng
             )
-        frame = Frame(color, depth, EPOCH_NS + offset_ns, self.intrinsics)
+        frame = Frame(color, depth, self.stamp_ns(index), self.intrinsics)
         return SimulatedFrame(frame, picture.truth())
+
+    def stamp_ns(self, index: int) -> int:
+        """Stamp of a frame without rendering it."""
+        return EPOCH_NS + self._offsets_ns[index]
 
     def truth(self, index: int) -> Truth:
         """The truth about one frame alone, several times faster than the frame."""
-        return _Picture(self, self._offset_ns(index) * 1e-9, shade=False).truth()
-
-    def _offset_ns(self, index: int) -> int:
-        """Nanoseconds from the start to a frame."""
-        if index < 0:
-            index += self._count
-        if not 0 <= index < self._count:
-            raise IndexError(f'frame {index} of a sequence of {self._count}')
-        return round(index * 1e9 / self.rate_hz)
+        return _Picture(self, self._offsets_ns[index] * 1e-9, shade=False).truth()
 
     def background(self, view: View) -> tuple[npt.NDArray[np.uint8], npt.NDArray[np.float32]]:
         """The empty room; drawn once where the camera is fixed."""
