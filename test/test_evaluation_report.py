@@ -9,6 +9,7 @@ import csv
 import json
 import math
 import re
+from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -26,6 +27,8 @@ from rgbd_kcf_tracker.evaluation.perframe import Info, Result, read_per_frame, w
 from rgbd_kcf_tracker.evaluation.store import Truth
 from rgbd_kcf_tracker.evaluation.table import Table
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.parameters import Parameters, parameter
+from rgbd_kcf_tracker.trackers import VARIANTS, Track, TrackState, Variant
 
 TRUTH = Box(10, 10, 20, 20)
 AWAY = Box(200, 100, 20, 20)
@@ -335,6 +338,50 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
     assert cells(tables.overview(measured), 'peer')['success %'] == pytest.approx(
         float(rows['peer']['success %']), rel=1e-5
     )
+
+
+@dataclass(frozen=True)
+class ToyParameters(Parameters):
+    use_motion: bool = parameter(True, 'Move with the patch.')
+    use_luck: bool = parameter(True, 'Changes nothing.')
+    use_magic: bool = parameter(False, 'Off by default.')
+    speed: float = parameter(2.0, 'Pixels per frame.')
+
+
+class ToyTracker:
+    """Moves its box by a constant, or leaves it where it was."""
+
+    def __init__(self, parameters: ToyParameters) -> None:
+        self.step = parameters.speed if parameters.use_motion else 0.0
+
+    def start(self, frame, box):
+        self.box = box
+        return Track(box, TrackState.TRACKING, 1.0)
+
+    def update(self, frame):
+        self.box = self.box.moved(self.step, 0)
+        return Track(self.box, TrackState.TRACKING, 0.5)
+
+
+def test_ablation_switches_each_ingredient_off_in_turn(
+    scenes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+):
+    monkeypatch.setitem(VARIANTS, 'toy', Variant('toy', 'a toy', ToyParameters, ToyTracker))
+    report = tmp_path / 'report'
+    words = ['evaluate', str(scenes), '--sequences', 'walk_1', '--variants', 'toy,kcf', '--ablate']
+    assert main([*words, '--param', 'toy.speed=2', '--jobs', '1', '--report', str(report)]) == 0
+    (path,) = (report / 'tables').glob('ablation_*.csv')
+    with path.open() as file:
+        rows = list(csv.reader(file))[1:]
+    names = [row[0] for row in rows]
+    base = 'toy speed=2'
+    assert names == [base, f'{base} without motion', f'{base} without luck']
+    success, change = ([row[i] for row in rows] for i in (1, 2))
+    assert float(success[0]) > float(success[1]) + 20
+    assert float(change[1]) == pytest.approx(float(success[1]) - float(success[0]), abs=1e-3)
+    assert (change[0], float(change[2])) == ('', 0)
+    assert f'What {base} loses without each ingredient' in (report / 'index.html').read_text()
+    assert 'without motion' in capsys.readouterr().out
 
 
 def test_princetons_test_set_is_run_and_written_but_not_measured(tmp_path: Path, capsys):
