@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.trackers.kcf import KcfParameters, KcfTracker
+from rgbd_kcf_tracker.trackers.metric import MetricTracker
+from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
 from rgbd_kcf_tracker.trackers.rgbd import RgbdParameters, RgbdTracker
 from rgbd_kcf_tracker.trackers.rgbd_pf import RgbdPfParameters, RgbdPfTracker
 from rgbd_kcf_tracker.trackers.track import Track, Tracker, TrackState
@@ -62,9 +64,15 @@ VARIANTS: dict[str, Variant] = {
             RgbdPfParameters,
             RgbdPfTracker,
         ),
+        Variant(
+            'metric',
+            'surfaces in metres, with a correlation filter where depth says nothing',
+            MetricParameters,
+            MetricTracker,
+        ),
     )
 }
-DEFAULT_VARIANT = 'kcf'
+DEFAULT_VARIANT = 'metric'
 
 
 def _variant(name: str) -> Variant:

@@ -1,0 +1,61 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A frame's depth image at the resolution in which surfaces are looked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Intrinsics
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthView:
+    """Every ``step``-th pixel of a depth image.
+
+    Attributes:
+        depth: ``(h, w)`` float32 metres, 0 where there is no reading (so that comparisons need no
+            mask and raise no warning).
+        step: pixels of the colour image per pixel of the view, in both directions.
+        intrinsics: of the view, that is the colour image's divided by ``step``.
+    """
+
+    depth: npt.NDArray[np.float32]
+    step: int
+    intrinsics: Intrinsics
+
+    @classmethod
+    def of(cls, frame: Frame, width: int) -> DepthView | None:
+        """The view of a frame at about ``width`` columns, or None for a frame without depth.
+
+        Holes of a single pixel are filled from the pixel half a step away. Without intrinsics a
+        camera of 60 degrees is assumed: sizes are then in the same wrong metre everywhere, which
+        is all the tracker needs.
+        """
+        if frame.depth is None:
+            return None
+        step = max(1, round(frame.width / width))
+        half = step // 2
+        depth = np.array(frame.depth[half::step, half::step])
+        invalid = ~(depth > 0)
+        if half:
+            other = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]]
+            np.copyto(depth, other, where=invalid)
+            invalid = ~(depth > 0)
+        depth[invalid | ~np.isfinite(depth)] = 0.0
+        k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
+        return cls(
+            depth,
+            step,
+            Intrinsics(k.fx / step, k.fy / step, (k.cx - half) / step, (k.cy - half) / step),
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.depth.shape[0], self.depth.shape[1]

@@ -1,0 +1,107 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A correlation filter that may only look where the target is.
+
+A filter learned from a window sees the background of every cyclic shift as well. Holding it to the
+target's silhouette lets the window be large, so that a target may move far between two frames,
+without the background being learned. The constraint and its solution by the alternating direction
+method of multipliers are those of Lukezic et al., "Discriminative Correlation Filter with Channel
+and Spatial Reliability" (CVPR 2017), section 3.2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy import fft
+
+Features = npt.NDArray[np.float32]
+Spectrum = npt.NDArray[np.complex64]
+
+PENALTY = 5.0
+PENALTY_GROWTH = 3.0
+PENALTY_MAX = 20.0
+SPARSITY = 0.01
+
+
+def gaussian_label(size: int, sigma: float) -> npt.NDArray[np.float32]:
+    """The wanted response ``(size, size)``: a Gaussian about element 0, 0, cyclic."""
+    d = np.minimum(np.arange(size), size - np.arange(size)).astype(np.float32)
+    line = np.exp(-0.5 * (d / sigma) ** 2)
+    label: npt.NDArray[np.float32] = np.outer(line, line).astype(np.float32)
+    return label
+
+
+class MaskedFilter:
+    """The filter over ``(channels, size, size)`` features and what it learned.
+
+    Args:
+        size: cells along a side of the window.
+        sigma: width of the wanted response in cells.
+        iterations: of the solver for each sample.
+    """
+
+    def __init__(self, size: int, sigma: float, iterations: int) -> None:
+        self.size = size
+        self._label = np.conj(fft.rfft2(gaussian_label(size, sigma))).astype(np.complex64)
+        self._iterations = iterations
+        self._filter: Spectrum | None = None
+        self._weights: npt.NDArray[np.float32] | None = None
+
+    def _solved(self, spectrum: Spectrum, mask: npt.NDArray[np.float32]) -> Spectrum:
+        shape = (self.size, self.size)
+        power = (spectrum.real**2 + spectrum.imag**2).astype(np.float32)
+        cross = spectrum * self._label
+        penalty = np.float32(PENALTY)
+        slack = np.float32(SPARSITY)
+        first = fft.irfft2(cross / (power + slack * penalty), s=shape)
+        masked = fft.rfft2(first * mask)
+        multiplier = np.zeros_like(cross)
+        for _ in range(self._iterations):
+            free = cross + penalty * masked
+            free -= multiplier
+            free /= power + penalty
+            spatial = fft.irfft2(penalty * free + multiplier, s=shape)
+            spatial *= mask / (slack + penalty)
+            masked = fft.rfft2(spatial)
+            multiplier += penalty * (free - masked)
+            penalty = np.float32(min(PENALTY_MAX, PENALTY_GROWTH * float(penalty)))
+        result: Spectrum = masked.astype(np.complex64)
+        return result
+
+    def learn(self, features: Features, mask: npt.NDArray[np.float32], rate: float) -> None:
+        """Take one sample: windowed features with the target in the middle, and its mask.
+
+        Args:
+            features: ``(channels, size, size)``.
+            mask: ``(size, size)`` 0 to 1, where the filter may be other than 0.
+            rate: share of the sample in what is remembered; 1 for the first.
+        """
+        spectrum = fft.rfft2(features)
+        solved = self._solved(spectrum, mask)
+        response = fft.irfft2(np.conj(solved) * spectrum, s=(self.size, self.size))
+        weights = response.reshape(len(response), -1).max(axis=1)
+        weights = np.maximum(weights, 0).astype(np.float32)
+        weights /= max(float(weights.sum()), 1e-9)
+        if self._filter is None or self._weights is None:
+            self._filter, self._weights = solved, weights
+        else:
+            r = np.float32(rate)
+            self._filter = (1 - r) * self._filter + r * solved
+            self._weights = (1 - r) * self._weights + r * weights
+
+    def response(self, features: Features) -> npt.NDArray[np.float32]:
+        """How much each shift of the window looks like the target, ``(size, size)``, cyclic.
+
+        Element 0, 0 stands for the window's middle. About 1 at the peak where all is as learned.
+
+        Args:
+            features: ``(channels, size, size)`` as for :meth:`learn`.
+        """
+        assert self._filter is not None, 'learn first'
+        assert self._weights is not None, 'learn first'
+        spectrum = fft.rfft2(features)
+        product = np.einsum('chw,c->hw', np.conj(self._filter) * spectrum, self._weights)
+        result: npt.NDArray[np.float32] = fft.irfft2(product, s=(self.size, self.size))
+        return result

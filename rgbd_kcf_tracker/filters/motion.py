@@ -1,0 +1,71 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where a target in metres goes next: constant velocity with white-noise acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class MotionFilter:
+    """A Kalman filter over position and velocity in metres and seconds, axis by axis.
+
+    The three axes do not mix (the noise is isotropic enough), so the covariance is three 2 x 2
+    matrices rather than one of 6 x 6.
+
+    Args:
+        position: ``(3,)`` metres.
+        position_sigma: metres.
+        speed_sigma: metres per second, of the unknown first velocity.
+        acceleration: metres per second squared, of the process noise.
+    """
+
+    def __init__(
+        self,
+        position: FloatArray,
+        position_sigma: float,
+        speed_sigma: float,
+        acceleration: FloatArray,
+    ) -> None:
+        self.position = np.array(position, dtype=np.float64)
+        self.velocity = np.zeros(3)
+        self._p00 = np.full(3, position_sigma**2)
+        self._p01 = np.zeros(3)
+        self._p11 = np.full(3, speed_sigma**2)
+        self._noise = np.array(acceleration, dtype=np.float64) ** 2
+
+    @property
+    def sigma(self) -> FloatArray:
+        """Standard deviation of the position, ``(3,)`` metres."""
+        result: FloatArray = np.sqrt(self._p00)
+        return result
+
+    @property
+    def speed_sigma(self) -> FloatArray:
+        """Standard deviation of the velocity, ``(3,)`` metres per second."""
+        result: FloatArray = np.sqrt(self._p11)
+        return result
+
+    def predict(self, dt: float, noise: float = 1.0) -> None:
+        """Move on by ``dt`` seconds, with ``noise`` times the acceleration."""
+        q = self._noise * noise**2
+        self.position = self.position + self.velocity * dt
+        self._p00 = self._p00 + 2 * dt * self._p01 + dt * dt * self._p11 + q * dt**4 / 4
+        self._p01 = self._p01 + dt * self._p11 + q * dt**3 / 2
+        self._p11 = self._p11 + q * dt**2
+
+    def correct(self, position: FloatArray, sigma: FloatArray) -> None:
+        """Take a measured position, ``(3,)`` metres, each axis with its own deviation."""
+        innovation = position - self.position
+        total = self._p00 + sigma**2
+        gain0, gain1 = self._p00 / total, self._p01 / total
+        self.position = self.position + gain0 * innovation
+        self.velocity = self.velocity + gain1 * innovation
+        p01 = self._p01
+        self._p00 = (1 - gain0) * self._p00
+        self._p11 = self._p11 - gain1 * p01
+        self._p01 = (1 - gain0) * p01
