@@ -84,6 +84,7 @@ class Rig:
         self.depth = self.node.create_publisher(Image, 'depth/image', qos)
         self.info = self.node.create_publisher(CameraInfo, 'color/camera_info', qos)
         self.init = self.node.create_publisher(RegionOfInterest, f'{tracker}/init', qos)
+        self.init_point = self.node.create_publisher(PointStamped, f'{tracker}/init_point', qos)
         self.compressed: dict[str, Any] = {}
 
         def listen(kind: Any, topic: str, keep: Callable[[Any], None]) -> None:
@@ -133,6 +134,15 @@ class Rig:
         self.send_color(index, **header)
         self.send_depth(index, **header)
 
+    def send_images(self, index: int, color: np.ndarray, depth_m: np.ndarray) -> None:
+        """Any pictures, and the answer to them awaited."""
+        before = len(self.boxes)
+        header = self.header(index)
+        self.color.publish(image_message(header, color, 'bgr8'))
+        millimetres = np.nan_to_num(depth_m * 1000).astype(np.uint16)
+        self.depth.publish(image_message(header, millimetres, '16UC1'))
+        self.wait(lambda: len(self.boxes) > before, what=f'box of frame {index}')
+
     def send_compressed(self, topic: str, message: CompressedImage) -> None:
         if topic not in self.compressed:
             publisher = self.node.create_publisher(CompressedImage, topic, QoSProfile(depth=50))
@@ -169,6 +179,8 @@ class Rig:
 
     def values(self) -> dict[str, str]:
         """Key values of the last diagnostics, with its sentence and level."""
+        if not self.diagnostics:
+            return {}
         status = self.diagnostics[-1]
         found = {pair.key: pair.value for pair in status.values}
         return found | {'message': status.message, 'level': str(status.level[0])}
@@ -187,7 +199,7 @@ class Rig:
             return (
                 all(
                     p.get_subscription_count() > 0
-                    for p in (self.color, self.depth, self.info, self.init)
+                    for p in (self.color, self.depth, self.info, self.init, self.init_point)
                 )
                 and node.count_publishers(f'{tracker}/box') > 0
                 and node.count_publishers(f'{tracker}/occluded') > 0

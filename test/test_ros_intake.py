@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
-from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.ros.intake import Intake
 from rgbd_kcf_tracker.ros.processor import Camera
 from rgbd_kcf_tracker.ros.session import Session
@@ -296,3 +296,28 @@ def test_session_reset_forgets_target_and_wishes() -> None:
     made.reset()
     assert not made.needs_frame
     assert made.process(frame(1)).state is TrackState.IDLE
+
+
+def test_session_chooses_by_itself_and_again_when_lost() -> None:
+    made, _ = session()
+    looked: list[int] = []
+
+    def auto(seen: Frame) -> Box | None:
+        looked.append(seen.stamp_ns)
+        return Box(60, 40, 30, 40) if len(looked) > 2 else None
+
+    made.choose_by_itself(auto)
+    assert made.needs_frame
+    states = [made.process(frame(i)).state for i in range(5)]
+    assert states == [TrackState.IDLE] * 2 + [TrackState.TRACKING] * 3
+    assert len(looked) == 3
+    made.track = Track(None, TrackState.LOST)
+    made.process(frame(5))
+    assert len(looked) == 3
+    made.track = Track(None, TrackState.LOST)
+    made.choose_by_itself(auto, again=True)
+    assert made.process(frame(6)).state is TrackState.TRACKING
+    assert len(looked) == 4
+    made.choose_by_itself(None)
+    made.reset()
+    assert not made.needs_frame

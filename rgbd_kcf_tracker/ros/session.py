@@ -58,6 +58,8 @@ class Session:
         self._tracker = create_tracker(variant, parameters)
         self._report = report
         self._choice: Choice | None = None
+        self._auto: Choice | None = None
+        self._auto_again = False
         self.track = IDLE
 
     @property
@@ -68,12 +70,26 @@ class Session:
     @property
     def needs_frame(self) -> bool:
         """Whether the next frame's pixels matter: a target is followed or to be chosen."""
-        return self._choice is not None or self.track.state is not TrackState.IDLE
+        return self.choosing or self.track.state is not TrackState.IDLE
 
     @property
     def choosing(self) -> bool:
-        """Whether a choice of the target waits for a frame."""
-        return self._choice is not None
+        """Whether a target is to be chosen in the next frame."""
+        return self._choice is not None or self._auto_due()
+
+    def choose_by_itself(self, auto: Choice | None, again: bool = False) -> None:
+        """Ask ``auto`` for a target whenever there is none.
+
+        Args:
+            auto: None: wait to be told.
+            again: also when the target is lost.
+        """
+        self._auto, self._auto_again = auto, again
+
+    def _auto_due(self) -> bool:
+        state = self.track.state
+        lost = state is TrackState.LOST and self._auto_again
+        return self._auto is not None and (state is TrackState.IDLE or lost)
 
     def choose(self, choice: Choice | None) -> None:
         """Take the target that ``choice`` finds, from the next frame on; None waits no more."""
@@ -116,7 +132,10 @@ class Session:
 
     def process(self, frame: Frame) -> Track:
         """Follow the target into the next frame, or start on it."""
-        if self._choice is not None and self.start(frame, self._choice):
+        choice = self._choice
+        if choice is None and self._auto_due():
+            choice = self._auto
+        if choice is not None and self.start(frame, choice):
             return self.track
         if self.track.state is not TrackState.IDLE:
             self.track = self._tracker.update(frame)

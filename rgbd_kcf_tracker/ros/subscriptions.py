@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from geometry_msgs.msg import PointStamped
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -28,17 +29,19 @@ class Subscriptions:
     Args:
         node: whose they are.
         settings: transports and QoS.
-        color, depth, camera_info, init: called with each message.
+        color, depth, camera_info, init, init_point: called with each message.
     """
 
     def __init__(
         self,
         node: Node,
         settings: NodeParameters,
+        *,
         color: Callable[[Any], None],
         depth: Callable[[Any], None],
         camera_info: Callable[[Any], None],
         init: Callable[[Any], None],
+        init_point: Callable[[Any], None],
     ) -> None:
         self._node = node
         qos = image_qos(settings)
@@ -64,7 +67,8 @@ class Subscriptions:
         )
         self._topics[CAMERA_INFO] = info.topic_name
         request = node.create_subscription(RegionOfInterest, '~/init', init, REQUEST_DEPTH)
-        self._all += [info, request]
+        point = node.create_subscription(PointStamped, '~/init_point', init_point, REQUEST_DEPTH)
+        self._all += [info, request, point]
 
     def topic(self, name: str) -> str:
         """The full name of an input after remapping."""

@@ -16,22 +16,22 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
-from sensor_msgs.msg import CameraInfo, RegionOfInterest
+from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
-from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.intake import Intake
-from rgbd_kcf_tracker.ros.messages import box_from_roi
 from rgbd_kcf_tracker.ros.parameters import ParameterServer
 from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
 from rgbd_kcf_tracker.ros.publishers import TrackPublishers
-from rgbd_kcf_tracker.ros.session import Choice, Session, warm_up
-from rgbd_kcf_tracker.ros.settings import ALL, RESTART, NodeParameters, parse_box
+from rgbd_kcf_tracker.ros.requests import Requests
+from rgbd_kcf_tracker.ros.session import Session, warm_up
+from rgbd_kcf_tracker.ros.settings import ALL, NodeParameters
 from rgbd_kcf_tracker.ros.statistics import Statistics
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
 from rgbd_kcf_tracker.ros.worker import Worker
@@ -56,6 +56,7 @@ class TrackerNode(LifecycleNode):
         self.statistics = Statistics()
         self._session: Session | None = None
         self._processor: Processor | None = None
+        self._requests: Requests | None = None
         self._outputs: TrackPublishers | None = None
         self._worker: Worker[Capture] | None = None
         self._intake: Intake | None = None
@@ -69,8 +70,12 @@ class TrackerNode(LifecycleNode):
         self._settings = self._parameters_server.node_parameters()
         # Diagnostics speak in every lifecycle state, so theirs is a plain publisher.
         self._diagnostics = Node.create_publisher(self, DiagnosticArray, '/diagnostics', 10)
-        self._diagnostics_timer = self.create_timer(DIAGNOSTICS_PERIOD_S, self._publish_diagnostics)
-        self._poll_timer = self.create_timer(POLL_PERIOD_S, self._poll)
+        # Timers on the node's own clock would stand still while recorded time does.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics_timer = self.create_timer(
+            DIAGNOSTICS_PERIOD_S, self._publish_diagnostics, clock=steady
+        )
+        self._poll_timer = self.create_timer(POLL_PERIOD_S, self._poll, clock=steady)
         self._poll_timer.cancel()
 
         self._answer_impossible_transitions()
@@ -122,9 +127,11 @@ class TrackerNode(LifecycleNode):
                 color_transport=settings.color_transport,
                 depth_transport=settings.depth_transport,
             )
-            self._processor.on_restart = self._stamps_restarted
-            self._reset_service = self.create_service(Trigger, '~/reset', self._on_reset)
-            self._choose_box(parse_box(settings.init_box))
+            self._requests = Requests(
+                self._processor, lambda: self._settings, self._in_worker, self._fault
+            )
+            self._reset_service = self.create_service(Trigger, '~/reset', self._requests.reset)
+            self._requests.from_parameters(frozenset({'init_box', 'auto_init'}))
         except Exception as error:  # rclpy would hide it
             self.get_logger().error(f'cannot configure: {error}')
             self._take_down()
@@ -133,7 +140,7 @@ class TrackerNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen to the camera and start the worker."""
-        if self._processor is None:
+        if self._processor is None or self._requests is None:
             return FAILURE
         settings = self._settings
         try:
@@ -149,7 +156,13 @@ class TrackerNode(LifecycleNode):
                 self._processor, self._worker_failed, keep=settings.queue_size if patient else 1
             )
             self._inputs = Subscriptions(
-                self, settings, self._on_color, self._on_depth, self._on_camera_info, self._on_init
+                self,
+                settings,
+                color=self._on_color,
+                depth=self._on_depth,
+                camera_info=self._on_camera_info,
+                init=self._requests.init,
+                init_point=self._requests.init_point,
             )
         except Exception as error:  # rclpy would hide it
             self.get_logger().error(f'cannot activate: {error}')
@@ -202,7 +215,7 @@ class TrackerNode(LifecycleNode):
         if self._reset_service is not None:
             self.destroy_service(self._reset_service)
             self._reset_service = None
-        self._session = self._processor = None
+        self._session = self._processor = self._requests = None
 
     # --- receiving: store only -------------------------------------------------------------------
 
@@ -243,46 +256,10 @@ class TrackerNode(LifecycleNode):
 
     # --- requests --------------------------------------------------------------------------------
 
-    def _on_init(self, message: RegionOfInterest) -> None:
-        try:
-            box = box_from_roi(message)
-        except RgbdKcfError as error:
-            self._fault('rejected_requests', f'~/init: {error}')
-            return
-        self._choose(lambda _: box)
-
-    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        session = self._session
-        response.success = session is not None
-        response.message = 'target dropped' if session else 'the node is not configured'
-        if session is not None:
-            self._in_worker(session.reset)
-        return response
-
-    def _choose(self, choice: Choice) -> None:
-        processor = self._processor
-        if processor is not None:
-            stale = self._settings.stale_after
-            self._in_worker(lambda: processor.choose(choice, stale))
-
-    def _choose_box(self, box: Box | None) -> None:
-        """Start on a box in the next image: the one that a parameter names."""
-        session = self._session
-        if session is not None and box is not None:
-            self._in_worker(lambda: session.choose(lambda _: box))
-
-    def _stamps_restarted(self) -> None:
-        """A bag looped (in the worker's thread)."""
-        if self._session is not None and self._settings.on_time_jump == RESTART:
-            self._session.reset()
-            box = parse_box(self._settings.init_box)
-            if box is not None:
-                self._session.choose(lambda _: box)
-
     def _parameters_changed(self, names: frozenset[str]) -> None:
         self._settings = self._parameters_server.node_parameters()
-        if 'init_box' in names:
-            self._choose_box(parse_box(self._settings.init_box))
+        if self._requests is not None:
+            self._requests.from_parameters(names)
         variant = self._settings.variant
         session = self._session
         if session is not None and any(n == 'variant' or '.' in n for n in names):

@@ -1,0 +1,96 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What users ask of the node: take this target, choose one, drop it.
+
+What searches the picture for a target is imported when it is first asked for: most nodes are told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from geometry_msgs.msg import PointStamped
+from sensor_msgs.msg import RegionOfInterest
+from std_srvs.srv import Trigger
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.ros.messages import box_from_roi
+from rgbd_kcf_tracker.ros.processor import Processor
+from rgbd_kcf_tracker.ros.session import Choice
+from rgbd_kcf_tracker.ros.settings import RESTART, NodeParameters, parse_box
+
+
+class Requests:
+    """Turns messages and parameters into choices for the session, in the worker's thread.
+
+    Args:
+        processor: whose session it is.
+        settings: the node's parameters as they stand.
+        in_worker: has a function called in the worker's thread.
+        fault: told of a request that cannot be met, by kind and in words.
+    """
+
+    def __init__(
+        self,
+        processor: Processor,
+        settings: Callable[[], NodeParameters],
+        in_worker: Callable[[Callable[[], None]], None],
+        fault: Callable[[str, str], None],
+    ) -> None:
+        self._processor, self._session = processor, processor.session
+        self._settings, self._in_worker, self._fault = settings, in_worker, fault
+        processor.on_restart = self._on_restart
+
+    def init(self, message: RegionOfInterest) -> None:
+        """``~/init``: a box in the newest image."""
+        try:
+            box = box_from_roi(message)
+        except RgbdKcfError as error:
+            self._fault('rejected_requests', f'~/init: {error}')
+            return
+        self._choose(lambda _: box)
+
+    def init_point(self, message: PointStamped) -> None:
+        """``~/init_point``: a pixel of the newest image."""
+        from rgbd_kcf_tracker.features.pointing import surface_at
+
+        u, v = float(message.point.x), float(message.point.y)
+        self._choose(lambda frame: surface_at(frame, u, v))
+
+    def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """``~/reset``: drop the target."""
+        self._in_worker(self._session.reset)
+        response.success, response.message = True, 'target dropped'
+        return response
+
+    def from_parameters(self, names: frozenset[str]) -> None:
+        """Do what parameters of these names ask for."""
+        if 'init_box' in names:
+            box = parse_box(self._settings().init_box)
+            if box is not None:
+                self._in_worker(lambda: self._session.choose(lambda _: box))
+        if any(name.startswith('auto_init') for name in names):
+            settings = self._settings()
+            auto: Choice | None = None
+            if settings.auto_init:
+                from rgbd_kcf_tracker.ros.auto_init import AutoInit
+
+                auto = AutoInit(settings)
+            again = settings.auto_init_again
+            self._in_worker(lambda: self._session.choose_by_itself(auto, again))
+
+    def _choose(self, choice: Choice) -> None:
+        oldest_s = self._settings().stale_after
+        self._in_worker(lambda: self._processor.choose(choice, oldest_s))
+
+    def _on_restart(self) -> None:
+        """The stamps went back for good, as a loop does (in the worker's thread)."""
+        settings = self._settings()
+        if settings.on_time_jump != RESTART:
+            return
+        self._session.reset()
+        box: Box | None = parse_box(settings.init_box)
+        if box is not None:
+            self._session.choose(lambda _: box)
