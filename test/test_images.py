@@ -5,10 +5,14 @@
 
 from __future__ import annotations
 
+import os
 import struct
+import subprocess
+import sys
 import tracemalloc
 import zlib
 from contextlib import suppress
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -312,6 +316,17 @@ def test_a_tiff_with_huge_tiles_is_refused() -> None:
             inspect(memoryview(hostile_tiff(64, 64, **tags)))
 
 
+def test_a_png_with_a_huge_chunk_is_refused() -> None:
+    """Found by fuzzing: OpenCV 5 allocates what the length of a chunk claims."""
+    data = bytearray(encode_bare_depth(depth_image(), 'png').data.tobytes())
+    at = data.index(b'IDAT')
+    data[at - 4] = 0xFF
+    with pytest.raises(ImageError, match='cut off'):
+        decode_compressed_depth(message(format='16UC1; png compressed', data=bytes(data)))
+    with pytest.raises(ImageError, match='cut off'):
+        decode_compressed_color(message(format='png', data=bytes(data)))
+
+
 def test_cut_off_images_are_refused() -> None:
     for packed, decode in (
         (encode_compressed_color(picture()), decode_compressed_color),
@@ -465,3 +480,19 @@ def test_raw_decoders_give_an_image_or_say_why_not(
             image = decode(msg)
             assert image.shape == (height, width, *channels)
             image.sum()  # reads every byte: a view past the end would crash
+
+
+def test_coverage_guided_fuzzing(tmp_path: Path) -> None:
+    """A short run; ``python test/fuzz_decoders.py`` runs for as long as one likes."""
+    pytest.importorskip('atheris', reason='pip install atheris to fuzz with coverage')
+    script = Path(__file__).with_name('fuzz_decoders.py')
+    done = subprocess.run(
+        [sys.executable, str(script), '-max_total_time=5', '-seed=1'],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join([str(script.parent), *sys.path])},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert list(tmp_path.iterdir()) == []

@@ -20,6 +20,7 @@ import pytest
 from bag_rig import CAMERA, assert_same_frames, make_frames
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
@@ -110,6 +111,8 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
         for item in reader.iter_decoded_messages():
             found.setdefault(item.channel.topic, []).append(item.decoded_message)
+    with AnyReader([tmp_path / 'a.mcap']) as other:
+        assert other.message_count == sum(len(messages) for messages in found.values())
     assert {name: len(messages) for name, messages in found.items()} == {
         '/kinect2/hd/image_color_rect': 3,
         '/kinect2/hd/image_depth_rect': 3,

@@ -12,8 +12,8 @@ from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError
 
-MAX_UNPACKED = 1 << 30
-"""Largest chunk or message that is unpacked: 1 GiB."""
+MAX_UNPACKED = 1 << 28
+"""Largest chunk or message that is unpacked, in bytes; a few kB of zstd can claim as much."""
 _WINDOW = 1 << 27
 
 

@@ -97,12 +97,24 @@ def _png(data: memoryview) -> tuple[Container, int, int]:
     length, kind, width, height, bits, color = struct.unpack_from('>I4sIIBB', data, 8)
     if kind != b'IHDR' or length != 13 or color not in _PNG_CHANNELS:
         raise ImageError('PNG image is damaged in its head')
-    if bytes(data[-64:]).find(b'IEND') < 0 and bytes(data).rfind(b'IEND') < 0:
-        raise ImageError(f'PNG image of {len(data)} bytes is cut off')
+    _walk_chunks(data)
     channels = _PNG_CHANNELS[color]
     # Grey of 1, 2 or 4 bits is widened to 8 by the decoder.
     stored = width * height * channels * bits // 8
     return Container(PNG, width, height, channels, max(bits, 8)), stored, _PNG_RATIO
+
+
+def _walk_chunks(data: memoryview) -> None:
+    """Refuse a PNG with a chunk that is longer than the data: a decoder may allocate its length."""
+    at = len(_PNG_SIGNATURE)
+    while at + 12 <= len(data):
+        length, kind = struct.unpack_from('>I4s', data, at)
+        at += 12 + length
+        if kind == b'IEND':
+            return
+        if kind == b'acTL':
+            raise ImageError('PNG image is animated: only still images are read')
+    raise ImageError(f'PNG image of {len(data)} bytes is cut off')
 
 
 def _jpeg(data: memoryview) -> tuple[Container, int, int]:
