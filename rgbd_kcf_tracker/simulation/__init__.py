@@ -10,7 +10,8 @@
 """
 
 from rgbd_kcf_tracker.simulation.build import check_request, kinect2_intrinsics, simulate
-from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence, Truth
+from rgbd_kcf_tracker.simulation.picture import Truth
+from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario
 
 __all__ = [

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.simulation import textures
+from rgbd_kcf_tracker.simulation import materials, textures
 from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.room import Face, draw_face
@@ -163,8 +163,8 @@ def mug(
     kind = str(rng.choice(['plain', 'logo', 'stripes', 'dots', 'two_tone']))
     atlas = Atlas([
         textures.cloth(rng, 96, 256, kind, (color, other, other)),
-        textures.paint(rng, 32, 32, color),
-        textures.paint(rng, 32, 32, (40, 60, 90)),
+        materials.paint(rng, 32, 32, color),
+        materials.paint(rng, 32, 32, (40, 60, 90)),
     ])  # fmt: skip
     height, radius = float(rng.uniform(0.085, 0.12)), float(rng.uniform(0.036, 0.046))
 

@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.simulation import (  # noqa: F401  (importing them registe
     scenarios_occlusion,
     scenarios_special,
 )
-from rgbd_kcf_tracker.simulation.scene import SimulatedSequence
+from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
 from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Stage
 
 QHD = (960, 540)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.simulation.scene import SimulatedFrame, SimulatedSequence
+from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 
 Image = npt.NDArray[np.uint8]
 VISIBLE: tuple[int, int, int] = (60, 230, 60)

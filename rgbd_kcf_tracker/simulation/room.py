@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.simulation import textures
+from rgbd_kcf_tracker.simulation import materials, textures
 from rgbd_kcf_tracker.simulation.solids import NEAR, Atlas, SolidList, Solids
 from rgbd_kcf_tracker.simulation.textures import Texture
 
@@ -183,23 +183,23 @@ def random_room(
     y = np.array([0, 1.0, 0])
     z = np.array([0, 0, 1.0])
     wide, deep = 2 * half_width, depth - near
-    wall = textures.wallpaper(rng, 512, 1400)
-    side = wall if rng.uniform() < 0.6 else textures.wallpaper(rng, 512, 1400)
+    wall = materials.wallpaper(rng, 512, 1400)
+    side = wall if rng.uniform() < 0.6 else materials.wallpaper(rng, 512, 1400)
     top_left = -half_width * x - height * y
-    ceiling = textures.ceiling(rng, 512, 512)
+    ceiling = materials.ceiling(rng, 512, 512)
     room.faces = [
         face(top_left + depth * z, wide * x, height * y, wall),
         face(top_left + near * z, deep * z, height * y, side, float(rng.uniform(0.75, 1))),
         face(top_left + wide * x + depth * z, -deep * z, height * y, side,
              float(rng.uniform(0.75, 1))),
-        face(-half_width * x + depth * z, wide * x, -deep * z, textures.floor(rng, 1024, 1024)),
+        face(-half_width * x + depth * z, wide * x, -deep * z, materials.floor(rng, 1024, 1024)),
         face(top_left + near * z, wide * x, deep * z, ceiling),
     ]  # fmt: skip
     for _ in range(int(rng.integers(1, 5))):
         w, h = rng.uniform(0.4, 1.6), rng.uniform(0.4, 1.2)
         left = rng.uniform(-half_width, half_width - w)
         corner = left * x - rng.uniform(h + 0.6, max(h + 0.7, 2.3)) * y + (depth - 0.02) * z
-        room.faces.append(face(corner, w * x, h * y, textures.poster(rng, 256, int(256 * w / h))))
+        room.faces.append(face(corner, w * x, h * y, materials.poster(rng, 256, int(256 * w / h))))
     for _ in range(clutter):
         add_furniture(rng, room, depth, half_width)
     return room
@@ -218,10 +218,10 @@ def add_furniture(rng: np.random.Generator, room: Room, depth: float, half_width
     turn = float(rng.normal(0, 0.15))
     kind = rng.choice(['cupboard', 'cupboard', 'box', 'table', 'chair', 'plant'])
     if kind == 'cupboard':
-        make = textures.FURNITURE[int(rng.integers(2))]
+        make = materials.FURNITURE[int(rng.integers(2))]
         size = (rng.uniform(0.6, 1.5), rng.uniform(0.7, 2.1), rng.uniform(0.35, 0.6))
         room.faces += box_faces(
-            spot, size, turn, [make(rng, 320, 320), textures.wood(rng, 128, 128)]
+            spot, size, turn, [make(rng, 320, 320), materials.wood(rng, 128, 128)]
         )
     elif kind == 'box':
         for level in range(int(rng.integers(1, 4))):
@@ -229,7 +229,7 @@ def add_furniture(rng: np.random.Generator, room: Room, depth: float, half_width
             lower = spot - np.array([rng.uniform(-0.05, 0.05), 0.35 * level, 0])
             room.faces += box_faces(
                 lower, (side, 0.35, side), turn + float(rng.normal(0, 0.2)),
-                [textures.cardboard(rng, 160, 160)],
+                [materials.cardboard(rng, 160, 160)],
             )  # fmt: skip
     elif kind == 'table':
         room.faces += table(rng, spot, turn)
@@ -242,7 +242,7 @@ def add_furniture(rng: np.random.Generator, room: Room, depth: float, half_width
 def table(rng: np.random.Generator, spot: Vector, turn: float) -> list[Face]:
     """A table with four legs."""
     w, d, h = rng.uniform(0.8, 1.5), rng.uniform(0.5, 0.8), rng.uniform(0.68, 0.78)
-    wood = [textures.wood(rng, 128, 256)]
+    wood = [materials.wood(rng, 128, 256)]
     faces = box_faces(spot - np.array([0, h - 0.04, 0]), (w, 0.04, d), turn, wood)
     return faces + _legs(spot, w, d, h - 0.04, turn, wood)
 
@@ -256,7 +256,7 @@ def chair(rng: np.random.Generator, spot: Vector, turn: float) -> list[Face]:
     shift = np.array([-np.sin(turn), 0, np.cos(turn)]) * (d / 2 - 0.02)
     back = rng.uniform(0.4, 0.6)
     faces += box_faces(spot + shift - np.array([0, h, 0]), (w, back, 0.04), turn, cloth)
-    return faces + _legs(spot, w, d, h - 0.06, turn, [textures.wood(rng, 64, 64)])
+    return faces + _legs(spot, w, d, h - 0.06, turn, [materials.wood(rng, 64, 64)])
 
 
 def _legs(
@@ -286,5 +286,5 @@ def plant(rng: np.random.Generator, spot: Vector) -> tuple[Solids, Atlas]:
         out.ellipsoid(centre, away, rng.uniform(0.04, 0.09), 0.015, 1, np.cross(away, x + 0.3 * y))
     green = (rng.uniform(30, 70), rng.uniform(90, 150), rng.uniform(40, 90))
     pot = textures.random_color(rng, (0.2, 0.7), (0.3, 0.8))
-    atlas = Atlas([textures.paint(rng, 64, 64, pot), textures.hair(rng, 64, 64, green)])
+    atlas = Atlas([materials.paint(rng, 64, 64, pot), textures.hair(rng, 64, 64, green)])
     return out.pack(), atlas

@@ -13,13 +13,14 @@ from itertools import pairwise
 import numpy as np
 
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.simulation import textures
+from rgbd_kcf_tracker.simulation import materials
 from rgbd_kcf_tracker.simulation.actors import FacesActor, PersonActor
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, Motion, hand_waves
-from rgbd_kcf_tracker.simulation.people import Person, Wardrobe, random_person
+from rgbd_kcf_tracker.simulation.people import Person, random_person
 from rgbd_kcf_tracker.simulation.room import Face, Room, box_faces, random_room
 from rgbd_kcf_tracker.simulation.scene import Actor, Gain, Scene
 from rgbd_kcf_tracker.simulation.sensor import SensorOptions
+from rgbd_kcf_tracker.simulation.wardrobe import Wardrobe
 
 Point = tuple[float, float]
 Timed = list[tuple[float, float, float]]
@@ -132,10 +133,10 @@ class Stage:
     ) -> list[Face]:  # fmt: skip
         """The faces of a box that stands at ``(x, z)``."""
         rng = self.rng
-        make = {'cupboard': textures.cabinet, 'shelf': textures.bookshelf,
-                'cardboard': textures.cardboard, 'wood': textures.wood}[skin]  # fmt: skip
+        make = {'cupboard': materials.cabinet, 'shelf': materials.bookshelf,
+                'cardboard': materials.cardboard, 'wood': materials.wood}[skin]  # fmt: skip
         texture = make(rng, 384, max(96, int(384 * size[0] / size[1])))
-        top = textures.wood(rng, 128, 128)
+        top = materials.wood(rng, 128, 128)
         turn = float(rng.normal(0, 0.12)) if turn is None else turn
         return box_faces(np.array([spot[0], 0.0, spot[1]]), size, turn, [texture, top])
 

@@ -1,0 +1,120 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The sequence of frames that a camera records of a scene, with the truth about each."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
+from rgbd_kcf_tracker.simulation.scene import Scene
+from rgbd_kcf_tracker.simulation.sensor import Sensor
+
+EPOCH_NS = 1_700_000_000_000_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimulatedFrame:
+    """A frame and the truth about it.
+
+    Attributes:
+        frame: what the camera recorded.
+        truth: where the target is.
+    """
+
+    frame: Frame
+    truth: Truth
+
+    @property
+    def visible(self) -> Box | None:
+        """See `Truth`."""
+        return self.truth.visible
+
+    @property
+    def body(self) -> Box | None:
+        """See `Truth`."""
+        return self.truth.body
+
+    @property
+    def visible_fraction(self) -> float:
+        """See `Truth`."""
+        return self.truth.visible_fraction
+
+    @property
+    def distance(self) -> float:
+        """See `Truth`."""
+        return self.truth.distance
+
+
+class SimulatedSequence:
+    """A recorded scene; frames are rendered when asked for.
+
+    ``len()``, indexing and iteration give `SimulatedFrame`; any order gives the same frames.
+
+    Args:
+        scene: what happens.
+        scenario: its name.
+        seed: of the camera's noise.
+        rate_hz: frames per second.
+        offsets_ns: of each frame from the start of the scene.
+        size: width and height of the picture.
+        intrinsics: of the camera.
+    """
+
+    def __init__(
+        self, scene: Scene, scenario: str, seed: int, rate_hz: float, offsets_ns: Sequence[int],
+        size: tuple[int, int], intrinsics: Intrinsics,
+    ) -> None:  # fmt: skip
+        self.scene, self.scenario, self.seed, self.rate_hz = scene, scenario, seed, rate_hz
+        self.size, self.intrinsics = size, intrinsics
+        self._offsets_ns = tuple(offsets_ns)
+        self._key = [seed, zlib.crc32(scenario.encode())]
+        self._sensor = Sensor(
+            scene.sensor, intrinsics, size, np.random.default_rng([*self._key, 7])
+        )
+        self._backdrop = Backdrop(scene, intrinsics, size)
+
+    def __len__(self) -> int:
+        """Number of frames."""
+        return len(self._offsets_ns)
+
+    def __iter__(self) -> Iterator[SimulatedFrame]:
+        """Frames in order."""
+        return (self[i] for i in range(len(self)))
+
+    def __getitem__(self, index: int) -> SimulatedFrame:
+        """Render one frame."""
+        offset_ns = self._offsets_ns[index]
+        t = offset_ns * 1e-9
+        rng = np.random.default_rng([*self._key, offset_ns // 1000])
+        picture = Picture(self._backdrop, t)
+        options = self.scene.sensor
+        color = self._sensor.color(picture.color, self.scene.light(t), rng)
+        depth = None
+        if options.has_depth:
+            later = (
+                picture
+                if options.delay_s == 0
+                else Picture(self._backdrop, t + options.delay_s, False)
+            )
+            blind = any(a <= t < b for a, b in options.no_target_depth)
+            depth = self._sensor.depth(
+                later.depth, picture.color, later.target_mask if blind else None, rng
+            )
+        frame = Frame(color, depth, self.stamp_ns(index), self.intrinsics)
+        return SimulatedFrame(frame, picture.truth())
+
+    def stamp_ns(self, index: int) -> int:
+        """Stamp of a frame without rendering it."""
+        return EPOCH_NS + self._offsets_ns[index]
+
+    def truth(self, index: int) -> Truth:
+        """The truth about one frame alone, several times faster than the frame."""
+        return Picture(self._backdrop, self._offsets_ns[index] * 1e-9, shade=False).truth()
