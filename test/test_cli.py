@@ -436,10 +436,11 @@ def test_closed_pipe_is_no_traceback(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ('name', 'fps', 'start', 'end'), [('redkitchen', 30, 0, 40), ('filinha', 5, 55, 95)]
+    ('name', 'variant', 'fps', 'start', 'end'),
+    [('redkitchen', 'metric', 30, 0, 20), ('filinha', 'kcf', 5, 60, 80)],
 )
 def test_real_recordings_give_the_same_boxes_from_folder_and_bag(
-    name: str, fps: int, start: int, end: int, shared_data: Path, tmp_path: Path
+    name: str, variant: str, fps: int, start: int, end: int, shared_data: Path, tmp_path: Path
 ) -> None:
     """Part of each, by links, as the bag of a whole one is half a gigabyte."""
     whole, source = shared_data / 'rgbd' / name, tmp_path / name
@@ -453,6 +454,7 @@ def test_real_recordings_give_the_same_boxes_from_folder_and_bag(
     assert main(['convert', str(source), str(bag), '--fps', str(fps)]) == 0
     for number, path in enumerate((source, bag)):
         output = str(tmp_path / f'{number}.csv')
-        assert main(['track', str(path), '--output', output, '--fps', str(fps)]) == 0
+        options = ['--fps', str(fps), '--variant', variant]
+        assert main(['track', str(path), '--output', output, *options]) == 0
     assert (tmp_path / '0.csv').read_text() == (tmp_path / '1.csv').read_text()
     assert 'tracking' in (tmp_path / '0.csv').read_text()
