@@ -25,6 +25,11 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.features.depth_patch import Depth
 
+# Unevenness of a body and noise of the camera, metres.
+_NOISE = 0.1
+# Share of the patch that must be left of a target for its motion to be read from it.
+_OWN_SHARE = 0.2
+
 
 @dataclass(frozen=True, slots=True)
 class DepthDifference:
@@ -128,7 +133,7 @@ class DepthPatch:
         if np.count_nonzero(valid) < least:
             return None
         reach = self._speed * interval
-        motion = float(np.clip(np.median(change[valid]), -reach, reach))
+        motion = self._motion(change[valid], reach)
         change = np.where(valid, change - np.float32(motion), 0)
         # One pixel counts for so much and no more: what decides is how many there are.
         change = np.clip(change, -self._cap, self._cap)
@@ -150,6 +155,17 @@ class DepthPatch:
             rows=rows,
             cols=cols,
         )
+
+    def _motion(self, change: Depth, reach: float) -> float:
+        """The shift that the target's own pixels share: those that it can have moved.
+
+        Taken over all pixels it would be the background's, or an occluder's, as soon as they are
+        the most, and then the target itself would seem to differ.
+        """
+        own = change[np.abs(change) <= reach + _NOISE]
+        if len(own) < _OWN_SHARE * len(change):
+            return 0.0
+        return float(np.clip(np.median(own), -reach, reach))
 
     def _high(
         self, size: npt.NDArray[np.float32], valid: npt.NDArray[np.bool_], axis: int

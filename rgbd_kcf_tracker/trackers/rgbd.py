@@ -88,17 +88,21 @@ class RgbdTracker(DepthAwareTracker):
     def _follow(self, frame: Frame, model: KcfModel, interval: float) -> Detection | None:
         """Steps 5 to 17 of Algorithm 1; :meth:`_see` is steps 3 and 4 for the next frame."""
         best, here = self._search(frame, model)
+        if not self._plausible(frame, best):
+            best = here
         if best.response > self._parameters.detect_threshold and (
             not self._hidden or self._plausible(frame, best)
         ):
             return self._detected(frame, model, best, interval)
         # Hidden, the target is where it was left: only what is there tells that it is free again.
+        places = (here,) if self._hidden or best == here else (best, here)
         reach = 0.0 if self._hidden else interval
-        difference = self._diff_at_centre(frame, self._box_at(here), reach)
-        if self._occlusion_status(difference, here.response):
-            self._hidden = True
-            return None
-        return self._partly_visible(frame, model, here, difference)
+        for found in places:
+            difference = self._diff_at_centre(frame, self._box_at(found), reach)
+            if not self._occlusion_status(difference, found.response):
+                return self._partly_visible(frame, model, found, difference)
+        self._hidden = True
+        return None
 
     def _search(self, frame: Frame, model: KcfModel) -> tuple[Detection, Detection]:
         """Steps 5 to 9: slide the window, respond to all patches at once, keep the best.
@@ -156,8 +160,8 @@ class RgbdTracker(DepthAwareTracker):
         return best
 
     def _partly_visible(
-        self, frame: Frame, model: KcfModel, here: Detection, difference: DepthDifference | None
+        self, frame: Frame, model: KcfModel, found: Detection, difference: DepthDifference | None
     ) -> Detection:
         """Step 16: the depth is still the target's, so go on at the updated position."""
-        self._see(frame, model, here, difference)
-        return here
+        self._see(frame, model, found, difference)
+        return found

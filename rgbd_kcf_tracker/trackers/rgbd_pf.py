@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.features.color_histogram import ColorHistogram, bhattacharyya_distance
 from rgbd_kcf_tracker.filters.particle_filter import (
@@ -153,8 +154,7 @@ class RgbdPfTracker(DepthAwareTracker):
         self._particles.predict(interval)
         if self._hidden:
             return self._look_for_hidden(frame, model)
-        last = self._box
-        here = model.detect(frame, last.cx, last.cy)
+        here = model.detect(frame, *self._center_of(self._particles.estimate()))
         difference = self._diff_at_centre(frame, self._box_at(here), interval)
         if self._occlusion_status(difference, here.response):
             # Step 19: the position is kept, nothing is learned, and no box is drawn.
@@ -175,7 +175,7 @@ class RgbdPfTracker(DepthAwareTracker):
         """Steps 13 to 16: which position the responses speak for; None for that of the last frame.
 
         Args:
-            here: found about the last position (pos'_i).
+            here: found about the position that the last frame predicts (pos'_i).
             there: found about the particles' estimate (pos'_pf).
         """
         p = self._parameters
@@ -197,7 +197,11 @@ class RgbdPfTracker(DepthAwareTracker):
         self._weigh(frame)
         mean = self._particles.estimate()
         self._particles.resample(self._parameters.resample_below)
-        return float(mean[X] + mean[WIDTH] / 2), float(mean[Y] + mean[HEIGHT] / 2)
+        return self._center_of(mean)
+
+    @staticmethod
+    def _center_of(state: npt.NDArray[np.float64]) -> tuple[float, float]:
+        return float(state[X] + state[WIDTH] / 2), float(state[Y] + state[HEIGHT] / 2)
 
     def _weigh(self, frame: Frame) -> None:
         """Likelihood of each particle by the colours of its region."""
@@ -229,10 +233,7 @@ class RgbdPfTracker(DepthAwareTracker):
         self._weigh(frame)
         weights, states = self._particles.weights, self._particles.states
         heaviest = states[int(np.argmax(weights))]
-        places = [
-            (state[X] + state[WIDTH] / 2, state[Y] + state[HEIGHT] / 2)
-            for state in (self._particles.estimate(), heaviest)
-        ]
+        places = [self._center_of(state) for state in (self._particles.estimate(), heaviest)]
         self._particles.resample(self._parameters.resample_below)
         places.append((self._box.cx, self._box.cy))
         candidates = self._detect_at(frame, model, places)
@@ -249,6 +250,8 @@ class RgbdPfTracker(DepthAwareTracker):
             return False
         if found.response >= self._parameters.accept_threshold:
             return True
+        if frame.depth is None:
+            return found.response >= (self._low + self._high) / 2
         difference = self._diff_at_centre(frame, self._box_at(found), _UNSEEN_S)
         return not self._occlusion_status(difference, found.response)
 
