@@ -268,7 +268,7 @@ def _shade(
         start, end = end, end + int(counts[i])
         q = matrices[i] @ point[:, start:end]
         q += offsets[i]
-        around[start:end] = cv2.phase(-q[2], q[0])[:, 0]
+        around[start:end] = cv2.phase(-q[2], q[0]).ravel()  # a vector or a column, by version
         if solids.ellipsoid[i]:
             along[start:end] = q[1] * np.float32(0.5) + np.float32(0.5)
         else:
