@@ -120,7 +120,8 @@ class Bystanders:
         view: DepthView,
         surfaces: Surfaces,
         target: Silhouette | None,
-        possible: list[int],
+        body: tuple[slice, slice],
+        possible: Mask,
         least_area: float,
     ) -> None:
         """Take what this frame shows, once it is known where in it the target is.
@@ -129,28 +130,33 @@ class Bystanders:
             view: as given to :meth:`compare`.
             surfaces: likewise.
             target: the target, or None where it is hidden: then only what was known stays known.
-            possible: labels of surfaces that might be the hidden target: they do not become known
-                for touching something that is.
+            body: rows and columns in which the whole body is expected: what is there at the
+                target's depth may be a piece of it that was not found.
+            possible: ``(n,)`` bool, surfaces that might be the hidden target coming out: they do
+                not become known for touching something that is.
             least_area: square metres below which a surface is no thing to be followed.
         """
         depth = view.depth
         if target is not None:
             other = depth > 0
             other[target.rows, target.cols] &= ~target.mask
-            around = np.s_[
-                max(0, target.rows.start - MARGIN) : target.rows.stop + MARGIN,
-                max(0, target.cols.start - MARGIN) : target.cols.stop + MARGIN,
-            ]
+            around = (
+                slice(
+                    max(0, min(target.rows.start, body[0].start) - MARGIN),
+                    max(target.rows.stop, body[0].stop) + MARGIN,
+                ),
+                slice(
+                    max(0, min(target.cols.start, body[1].start) - MARGIN),
+                    max(target.cols.stop, body[1].stop) + MARGIN,
+                ),
+            )
             other[around] &= np.abs(depth[around] - target.depth) > NEAR_TARGET
-            labels = surfaces.labels[target.rows, target.cols][target.mask]
-            things = np.bincount(labels, minlength=len(surfaces)) < 0.3 * surfaces.pixels
+            seen = np.bincount(surfaces.labels[other], minlength=len(surfaces))
+            things = seen > 0.7 * surfaces.pixels
         else:
-            spread = self.share > SPREAD
-            for label in possible:
-                if self.share[label] < 0.75:
-                    spread[label] = False
+            spread = (self.share > SPREAD) & ~possible
             other = spread[surfaces.labels] | self.known
-            things = (self.kin > 0.4) | (self.share > SPREAD)
+            things = ((self.kin > 0.4) | (self.share > SPREAD)) & ~possible
         self._last = np.where(other, depth, np.float32(0))
         self._remember_static(depth, other, target is not None)
         things &= (surfaces.pixels > 12) & (self._facts[:, 6] > np.log(least_area))

@@ -250,15 +250,22 @@ class BySurface:
             (y + self.body.height) * k.fy / z + k.cy,
         )
 
+    def _outline_slices(self, view: DepthView) -> tuple[slice, slice]:
+        """Rows and columns of the view in which the whole body is expected."""
+        if self.motion.position[2] < 0.3:
+            return slice(0, 0), slice(0, 0)
+        left, top, right, bottom = self._outline(view)
+        rows, cols = view.shape
+        x0, x1 = int(np.clip(left, 0, cols)), int(np.clip(right + 1, 0, cols))
+        y0, y1 = int(np.clip(top, 0, rows)), int(np.clip(bottom + 1, 0, rows))
+        return slice(y0, y1), slice(x0, x1)
+
     def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
         """Depth where the body is expected, and the pixels it would have if none were outside."""
         if self.motion.position[2] < 0.3:
             return np.zeros((0, 0), np.float32), 1.0
         left, top, right, bottom = self._outline(scene.view)
-        rows, cols = scene.view.shape
-        x0, x1 = int(np.clip(left, 0, cols)), int(np.clip(right + 1, 0, cols))
-        y0, y1 = int(np.clip(top, 0, rows)), int(np.clip(bottom + 1, 0, rows))
-        return scene.view.depth[y0:y1, x0:x1], max(1.0, (right - left + 1) * (bottom - top + 1))
+        return scene.view.depth[self._outline_slices(scene.view)], max(1.0, (right - left + 1) * (bottom - top + 1))
 
     def _should_be_seen(self, scene: Scene) -> float:
         """Share of the expected body that nothing nearer, no hole and no image edge hides."""
@@ -280,14 +287,37 @@ class BySurface:
         return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))
 
     def _remember(self, scene: Scene, target: Silhouette | None) -> None:
-        possible = [
-            c.seen.label
-            for c in self.candidates
-            if c.seen.label and c.placed.likeness > self.body.likeness - 0.12
-        ]
+        possible = self._may_come_out(scene)
+        for c in self.candidates:
+            if c.placed.likeness > self.body.likeness - 0.12 and c.evidence.known < 0.75:
+                possible[c.seen.label] = True
         self._bystanders.remember(
-            scene.view, scene.surfaces, target, possible, 0.05 * self.body.area
+            scene.view,
+            scene.surfaces,
+            target,
+            self._outline_slices(scene.view),
+            possible,
+            0.05 * self.body.area,
         )
+
+    def _may_come_out(self, scene: Scene) -> npt.NDArray[np.bool_]:
+        """Surfaces where a target that has not been hidden for long may come out, ``(n,)``."""
+        boxes = scene.surfaces.boxes
+        rows, cols = self._outline_slices(scene.view)
+        x, _, z = self.motion.sigma
+        beside = int(min(x, 0.5) * scene.view.intrinsics.fx / max(self.motion.position[2], 0.3))
+        near = np.abs(scene.surfaces.depth - self.motion.position[2]) < 0.25 + min(z, 0.25)
+        near &= (boxes[:, 0] < cols.stop + beside) & (boxes[:, 1] < rows.stop)
+        near &= boxes[:, 0] + boxes[:, 2] > cols.start - beside
+        near &= boxes[:, 1] + boxes[:, 3] > rows.start
+        result: npt.NDArray[np.bool_] = near & (self.body.area * 1.7 > self._areas(scene))
+        return result
+
+    @staticmethod
+    def _areas(scene: Scene) -> FloatArray:
+        k, z = scene.view.intrinsics, scene.surfaces.depth.astype(np.float64)
+        result: FloatArray = scene.surfaces.pixels * z * z / (k.fx * k.fy)
+        return result
 
     def _learn_around(self, scene: Scene, dt: float | None) -> None:
         """Learn the colours beside the target."""
