@@ -37,6 +37,9 @@ from bag_rig import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
@@ -140,6 +143,47 @@ def test_a_bag_in_several_files_is_one(tmp_path: Path) -> None:
     write_mcap(tmp_path / 'a' / 'a_9.mcap', sent[:7])
     write_mcap(tmp_path / 'a' / 'a_10.mcap', sent[7:])
     assert_same_frames(read(tmp_path / 'a')[0], FRAMES)
+
+
+def test_types_that_ros_2_lacks_or_changed_come_along_from_ros_1(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    text = 'Header header\nstring name\nfloat64[] values\ntime due\nmy_msgs/Part[] parts\n'
+    store.register(get_types_from_msg(text, 'my_msgs/msg/Thing'))
+    store.register(get_types_from_msg('uint8 KIND=3\nbool good\nduration age', 'my_msgs/msg/Part'))
+    # The name that tf had before tf2.
+    text = 'geometry_msgs/TransformStamped[] transforms'
+    store.register(get_types_from_msg(text, 'tf/msg/tfMessage'))
+    t = store.types
+    when = t['builtin_interfaces/msg/Time'](5, 6)
+    head = t['std_msgs/msg/Header'](1, when, 'here')
+    part = t['my_msgs/msg/Part'](True, t['builtin_interfaces/msg/Duration'](7, 8))
+    thing = t['my_msgs/msg/Thing'](head, 'thing', np.array([1.5, 2.5]), when, [part])
+    place = t['geometry_msgs/msg/Transform'](
+        t['geometry_msgs/msg/Vector3'](1, 2, 3), t['geometry_msgs/msg/Quaternion'](0, 0, 0, 1)
+    )
+    tf = t['tf/msg/tfMessage']([t['geometry_msgs/msg/TransformStamped'](head, 'b', place)])
+    empty = t['std_msgs/msg/ColorRGBA'](0, 0, 0, 1)
+    pose = t['geometry_msgs/msg/Pose'](t['geometry_msgs/msg/Point'](1, 2, 3), place.rotation)
+    age = t['builtin_interfaces/msg/Duration'](1, 2)
+    marker = t['visualization_msgs/msg/Marker'](
+        head, 'ns', 4, 1, 0, pose, place.translation, empty, age, False, [], [], 'words', '', False
+    )
+    with Ros1Writer(tmp_path / 'a.bag') as writer:
+        for number, message in enumerate((thing, tf, marker)):
+            kind = message.__msgtype__
+            connection = writer.add_connection(f'/t{number}', kind, typestore=store)
+            writer.write(connection, number, store.serialize_ros1(message, kind))
+    bag = RawBag(tmp_path / 'a.bag')
+    assert copy_bag(bag, tmp_path / 'a.mcap') == (3, [])
+    bag.close()
+    with AnyReader([tmp_path / 'a.mcap']) as reader:
+        found = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()]
+    assert found[0].name == 'thing'
+    assert list(found[0].values) == [1.5, 2.5]
+    assert (found[0].header.frame_id, found[0].due.sec, found[0].due.nanosec) == ('here', 5, 6)
+    assert (found[0].parts[0].good, found[0].parts[0].age.sec) == (True, 7)
+    assert found[1].transforms[0].transform.translation.z == 3
+    assert (found[2].text, found[2].pose.position.y, found[2].texture_resource) == ('words', 2, '')
 
 
 # -- encodings through a bag -------------------------------------------------------------------

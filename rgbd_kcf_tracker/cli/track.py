@@ -156,7 +156,7 @@ class _Sinks:
         if self.csv is not None:
             self.csv.write_track(number, frame.stamp_ns, track)
         if self.video is not None:
-            words = f'frame {number}' + ('' if truth is None else '   truth white')
+            words = ('' if truth is None else 'truth white   ') + f'frame {number}'
             self.video.write_track(frame, track, truth, words)
         if self.bag is not None:
             self.bag.write_frame(frame)
