@@ -27,8 +27,12 @@ from rgbd_kcf_tracker.features.depth_patch import Depth
 
 # Unevenness of a body and noise of the camera, metres.
 _NOISE = 0.1
+# Half of what a body measures along the line of sight, arms included, metres.
+_BODY = 0.5
 # Share of the patch that must be left of a target for its motion to be read from it.
 _OWN_SHARE = 0.2
+# Quantile of the depths in a first box that is taken for the target's.
+_NEARER_PART = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +43,7 @@ class DepthDifference:
         value: the thesis's D_diff: mean absolute difference of the pixels that are left, in metres.
         nearer: the part of it that came nearer, in metres: what an occluder does.
         farther: share of the pixels that show something farther than the target.
-        distance: median depth of the new patch in metres.
+        distance: median depth in metres of the new patch where the remembered one is the target's.
         motion: shift in metres that was taken for the target's own motion.
         rows, cols: what the trimming left of the patch.
     """
@@ -102,12 +106,19 @@ class DepthPatch:
 
     def remember(self, patch: Depth) -> None:
         """Take the patch of a target that is surely seen."""
-        valid = np.isfinite(patch)
-        if np.mean(valid) < self._least_valid:
+        seen = patch[np.isfinite(patch)]
+        if len(seen) < self._least_valid * patch.size:
             return
-        self._depth = float(np.median(patch[valid]))
-        # What lies outside the image is the target's too: if it comes in, it comes at this depth.
-        self._patch = np.where(np.isinf(patch), np.float32(self._depth), patch)
+        depth = self._depth
+        if depth is None or np.mean(np.abs(seen - depth) <= _BODY) < _OWN_SHARE:
+            # The target is the nearer of what a box shows, even where it is the lesser part.
+            depth = float(np.quantile(seen, _NEARER_PART))
+        own = np.abs(patch - np.float32(depth)) <= _BODY
+        self._depth = float(np.median(patch[own]))
+        # Background between the limbs is not the target's: it is not compared. What lies outside
+        # the image is: if it comes in, it comes at this depth.
+        self._patch = np.where(own, patch, np.float32(np.nan))
+        self._patch[np.isinf(patch)] = self._depth
 
     def follow(self, difference: DepthDifference) -> None:
         """Let the remembered depth go with the target's own motion."""

@@ -154,7 +154,7 @@ class RgbdPfTracker(DepthAwareTracker):
         self._particles.predict(interval)
         if self._hidden:
             return self._look_for_hidden(frame, model)
-        here = model.detect(frame, *self._center_of(self._particles.estimate()))
+        here = self._expect(frame, model)
         difference = self._diff_at_centre(frame, self._box_at(here), interval)
         if self._occlusion_status(difference, here.response):
             # Step 19: the position is kept, nothing is learned, and no box is drawn.
@@ -171,11 +171,18 @@ class RgbdPfTracker(DepthAwareTracker):
         self._observe(found)
         return found
 
+    def _expect(self, frame: Frame, model: KcfModel) -> Detection:
+        """Step 6: found about the position that the particles predict, or about the last one."""
+        predicted = self._center_of(self._particles.estimate())
+        ahead = model.detect(frame, *predicted)
+        behind = model.detect(frame, self._box.cx, self._box.cy)
+        return ahead if ahead.response >= behind.response else behind
+
     def _decide(self, here: Detection, there: Detection) -> Detection | None:
         """Steps 13 to 16: which position the responses speak for; None for that of the last frame.
 
         Args:
-            here: found about the position that the last frame predicts (pos'_i).
+            here: found about the position expected from the last frame (pos'_i).
             there: found about the particles' estimate (pos'_pf).
         """
         p = self._parameters
@@ -250,7 +257,7 @@ class RgbdPfTracker(DepthAwareTracker):
             return False
         if found.response >= self._parameters.accept_threshold:
             return True
-        if frame.depth is None:
+        if frame.depth is None or self._depth_patch.depth is None:
             return found.response >= (self._low + self._high) / 2
         difference = self._diff_at_centre(frame, self._box_at(found), _UNSEEN_S)
         return not self._occlusion_status(difference, found.response)
