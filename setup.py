@@ -95,7 +95,7 @@ setup(
         'scipy>=1.10',
         'opencv-python-headless>=4.6',
         'rosbags>=0.11',
-        'mcap>=1.1',
+        'mcap>=1.6',  # Writer.flush
         'mcap-ros2-support>=0.5',
         'lz4',
         'zstandard',

@@ -380,7 +380,7 @@ def test_program_prints_help_version_and_usage() -> None:
     process = run_program('--help')
     out, _ = process.communicate()
     assert process.returncode == 0
-    for name in ('track', 'convert', 'info'):
+    for name in ('track', 'evaluate', 'convert', 'info', 'simulate', 'bench'):
         assert f'\n    {name} ' in out
     process = run_program('--version')
     assert process.communicate()[0].startswith('rgbd-kcf ')

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib
-import importlib.util
 import os
 import sys
 from collections.abc import Sequence
@@ -79,8 +78,6 @@ def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     # With a command named, only its module is imported, which keeps the start quick.
     named = [name for name in SUBCOMMANDS if name in arguments[:1]]
     for name in named or SUBCOMMANDS:
-        if importlib.util.find_spec(f'rgbd_kcf_tracker.cli.{name}') is None:
-            continue
         module = cast(Subcommand, importlib.import_module(f'rgbd_kcf_tracker.cli.{name}'))
         sub = commands.add_parser(
             module.NAME, help=module.HELP, description=module.HELP, allow_abbrev=False

@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
+from typing import cast
 
 import cv2
 import numpy as np
@@ -57,7 +60,14 @@ class VideoWriter:
         self, frame: Frame, track: Track, truth: Box | None = None, caption: str = ''
     ) -> None:
         """Write a frame with the tracker's answer, and the truth as a thin line, drawn on it."""
-        self.write(draw_track(frame.color, track, truth=truth, caption=caption))
+        # Words and lines want more pixels than a small picture has.
+        factor = max(1, math.ceil(_SMALLEST_WIDTH / frame.width))
+        image = frame.color
+        if factor > 1:
+            image = cast('npt.NDArray[np.uint8]', cv2.resize(image, None, fx=factor, fy=factor))
+            track = replace(track, box=_times(track.box, factor))
+            truth = _times(truth, factor)
+        self.write(draw_track(image, track, truth=truth, caption=caption))
 
     def write(self, image: npt.NDArray[np.uint8]) -> None:
         """Write a ``(H, W, 3)`` uint8 BGR picture; one of another size is fitted into the first's.
@@ -125,9 +135,8 @@ class VideoWriter:
             raise RecordingError(
                 f'{self.path} cannot be written: no ffmpeg ({error}); install imageio-ffmpeg'
             ) from None
-        # yuv420p wants even sides; words on small pictures want more pixels.
-        scale = max(1, round(_SMALLEST_WIDTH / width)) if width < _SMALLEST_WIDTH else 1
-        shape = f'scale=iw*{scale}:ih*{scale}:flags=bicubic,pad=ceil(iw/2)*2:ceil(ih/2)*2'
+        # yuv420p wants even sides.
+        shape = 'pad=ceil(iw/2)*2:ceil(ih/2)*2'
         command = [
             program, '-hide_banner', '-loglevel', 'error', '-y',
             '-f', 'rawvideo', '-pix_fmt', 'bgr24', '-s', f'{width}x{height}', '-r', f'{self.fps:g}',
@@ -149,6 +158,12 @@ class VideoWriter:
         self._log.seek(0)
         lines = self._log.read().decode('utf-8', 'replace').strip().splitlines()
         return f'{self.path} cannot be written: ffmpeg says {lines[-1] if lines else "nothing"!r}'
+
+
+def _times(box: Box | None, factor: int) -> Box | None:
+    if box is None:
+        return None
+    return Box(*(factor * value for value in box.as_tuple()))
 
 
 def _fitted(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> npt.NDArray[np.uint8]:
