@@ -164,7 +164,7 @@ class Rig:
 
     # --- what came back ---
 
-    def wait(self, condition: Callable[[], bool], timeout: float = 10.0, what: str = '') -> None:
+    def wait(self, condition: Callable[[], bool], timeout: float = 20.0, what: str = '') -> None:
         end = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > end:
@@ -191,22 +191,22 @@ class Rig:
         self.wait(lambda: len(self.diagnostics) > seen + 1, what='diagnostics')
         return self.values()
 
-    def await_listener(self) -> None:
-        """Until the tracker hears the camera, and its answers and requests find their way."""
-        node, tracker = self.node, self.tracker
+    def await_listener(self, tracker: TrackerNode | None = None) -> None:
+        """Until the tracker hears the camera, and its answers and requests find their way.
 
-        def connected() -> bool:
-            return (
-                all(
-                    p.get_subscription_count() > 0
-                    for p in (self.color, self.depth, self.info, self.init, self.init_point)
-                )
-                and node.count_publishers(f'{tracker}/box') > 0
-                and node.count_publishers(f'{tracker}/occluded') > 0
-            )
-
-        self.wait(connected, 20.0, 'the tracker')
-        time.sleep(0.1)  # discovery is one-sided
+        Discovery is one-sided. The tracker's side is asked where it runs in this process; another
+        process has seen the listeners of its answers when its diagnostics arrive, for their
+        listener was announced last.
+        """
+        topics = (self.color, self.depth, self.info, self.init, self.init_point)
+        self.wait(lambda: all(p.get_subscription_count() for p in topics), 40.0, 'the tracker')
+        if tracker is not None:
+            outputs = tracker._outputs
+            heard = (outputs._box, outputs._occluded, outputs._roi, outputs._position)
+            self.wait(lambda: all(p.get_subscription_count() for p in heard), 40.0, 'its answers')
+            return
+        name = f'{self.tracker}: tracker'
+        self.wait(lambda: any(d.name == name for d in self.diagnostics), 40.0, 'diagnostics')
 
 
 def overrides(values: dict[str, Any]) -> list[Parameter]:
@@ -234,7 +234,7 @@ def running_node(
     thread.start()
     try:
         if node.settings.autostart and wait:
-            rig.await_listener()
+            rig.await_listener(node)
         yield node
     finally:
         stop.set()

@@ -436,7 +436,7 @@ def test_publisher_dies_and_returns(live: Live) -> None:
     rig.color = rig.node.create_publisher(Image, 'color/image', 200)
     rig.depth = rig.node.create_publisher(Image, 'depth/image', 200)
     rig.info = rig.node.create_publisher(CameraInfo, 'color/camera_info', 200)
-    rig.await_listener()
+    rig.await_listener(live.node)
     live.goes_on(first)
     rig.wait(lambda: rig.values()['level'] != '2')
 

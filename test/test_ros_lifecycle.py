@@ -43,7 +43,7 @@ def rig() -> Iterator[Rig]:
 
 def call(rig: Rig, kind: Any, name: str, request: Any) -> Any:
     client = rig.node.create_client(kind, name)
-    assert client.wait_for_service(5)
+    assert client.wait_for_service(20)
     answer = client.call_async(request)
     rig.wait(answer.done, what=name)
     return answer.result()
@@ -77,7 +77,7 @@ def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:
         assert state(rig) == State.PRIMARY_STATE_INACTIVE
         assert node.count_subscribers('/color/image') == 0
         assert change(rig, Transition.TRANSITION_ACTIVATE)
-        rig.await_listener()
+        rig.await_listener(node)
         rig.play(range(5))
         assert rig.box().iou(scene(4)[2]) > 0.6
         # The target outlives a pause.
@@ -87,7 +87,7 @@ def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:
         assert len(rig.boxes) == 5
         assert rig.fresh_values()['message'] == 'inactive'
         assert change(rig, Transition.TRANSITION_ACTIVATE)
-        rig.await_listener()
+        rig.await_listener(node)
         rig.play(range(6, 9))
         assert rig.box().iou(scene(8)[2]) > 0.6
         # Cleaned up and configured again, it starts from its parameters.
@@ -97,7 +97,7 @@ def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:
         assert set_parameter(rig, 'init_box', box_text(20)).successful
         assert change(rig, Transition.TRANSITION_CONFIGURE)
         assert change(rig, Transition.TRANSITION_ACTIVATE)
-        rig.await_listener()
+        rig.await_listener(node)
         rig.play(range(20, 23))
         assert rig.box().iou(scene(22)[2]) > 0.6
         assert change(rig, Transition.TRANSITION_ACTIVE_SHUTDOWN)

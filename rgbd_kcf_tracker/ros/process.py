@@ -28,7 +28,7 @@ from rgbd_kcf_tracker.ros.memory import keep_large_blocks
 
 __all__ = ['keep_large_blocks', 'run', 'spin']
 
-_SPIN_PERIOD_S = 0.25
+_SPIN_PERIOD_S = 0.1
 
 
 def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
