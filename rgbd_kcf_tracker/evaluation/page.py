@@ -70,6 +70,7 @@ def strip_figures(
             read_truth(truth_path(folder, sequence)).visible,
             boxes,
             palette,
+            main,
             interesting=(own.frames.ratio <= 0.5) | ~own.frames.there,
         )
         if data is not None:

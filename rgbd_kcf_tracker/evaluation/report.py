@@ -101,7 +101,7 @@ def write_report(
         'unmeasured': collected.unmeasured,
         'main': main,
         'palette': palette,
-        'title': f'Trackers on {", ".join(Path(text).name for text in heading.datasets)}',
+        'title': f'Trackers on {_short(heading.datasets)}',
         'dataset': ', '.join(heading.datasets),
         'options': heading.options,
         'command': heading.command,
@@ -126,6 +126,13 @@ def main_tracker(
     ours = [c.name for c in contenders if c.kind == 'variant']
     wanted = (*ablated, 'metric', *reversed(ours))
     return next((name for name in wanted if name in measured), measured[-1])
+
+
+def _short(datasets: Sequence[str]) -> str:
+    """Data sets by name, however long the command was."""
+    names = ['simulated scenes' if d.startswith('sim:') else Path(d).name for d in datasets]
+    names = list(dict.fromkeys(names))
+    return ', '.join(names[:3]) + (f' and {len(names) - 3} more' if len(names) > 3 else '')
 
 
 def _all_tables(content: Mapping[str, Any]) -> list[Table]:

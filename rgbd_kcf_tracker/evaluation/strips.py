@@ -17,6 +17,8 @@ from rgbd_kcf_tracker.evaluation.store import slug
 
 FRAMES = 8
 COLUMNS = 4
+ENLARGED = 1.5
+"""Pictures are drawn larger than they were kept, so that lines and letters are fine."""
 _TRUTH = (255, 255, 255)
 _SHADOW = (0, 0, 0)
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -31,6 +33,7 @@ def strip(
     truth: Array,
     boxes: Mapping[str, Array],
     palette: Mapping[str, str],
+    main: str,
     interesting: npt.NDArray[np.bool_],
 ) -> bytes | None:
     """A strip as JPEG; None where no picture was kept.
@@ -42,27 +45,31 @@ def strip(
         truth: ``(N, 4)`` visible part, drawn dashed in black and white.
         boxes: per tracker ``(N, 4)``, drawn in the tracker's colour.
         palette: colours as ``#rrggbb``.
+        main: the tracker drawn on top of the others.
         interesting: ``(N,)`` frames that should be among those shown (occlusion, errors).
     """
     pictures = sorted((folder / 'thumbs' / slug(sequence)).glob('*.jpg'))
     indices = np.array([int(p.stem) for p in pictures if int(p.stem) < len(truth)], np.int64)
     if not len(indices):
         return None
+    scale = scale * ENLARGED
     tiles = []
     for i in choose(indices, interesting):
         path = folder / 'thumbs' / slug(sequence) / f'{i:06d}.jpg'
         picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
         if picture is None:
             continue
-        image: Picture = np.asarray(picture, np.uint8)
+        size = (round(picture.shape[1] * ENLARGED), round(picture.shape[0] * ENLARGED))
+        image: Picture = np.asarray(cv2.resize(picture, size), np.uint8)
         _dashed(image, truth[i] * scale)
         missing = []
-        for n, (name, own) in enumerate(boxes.items()):
-            if np.isnan(own[i, 0]):
+        for name in sorted(boxes, key=lambda name: name == main):
+            box = boxes[name][i]
+            if np.isnan(box[0]):
                 missing.append(name)
-            else:  # thinner and thinner, so that boxes on top of each other are all seen
-                thickness = max(1, min(len(boxes), 5) - n)
-                _rectangle(image, own[i] * scale, _bgr(palette[name]), thickness)
+            else:  # the main tracker's line is thin, on top: a box below it shows as a rim
+                thickness = 2 if name == main else 4
+                _rectangle(image, box * scale, _bgr(palette[name]), thickness)
         _label(image, f'{i}', missing, palette, np.isnan(truth[i, 0]))
         tiles.append(image)
     if not tiles:
@@ -129,12 +136,12 @@ def _label(
 ) -> None:
     """Frame number, 'absent' where the target is, a dot for each tracker without a box."""
     words = f'{text}  absent' if absent else text
-    (width, height), _ = cv2.getTextSize(words, _FONT, 0.42, 1)
-    cv2.rectangle(image, (0, 0), (width + 8 + 13 * len(missing), height + 8), (40, 40, 40), -1)
-    cv2.putText(image, words, (4, height + 3), _FONT, 0.42, (255, 255, 255), 1, cv2.LINE_AA)
+    (width, height), _ = cv2.getTextSize(words, _FONT, 0.55, 1)
+    cv2.rectangle(image, (0, 0), (width + 10 + 16 * len(missing), height + 8), (40, 40, 40), -1)
+    cv2.putText(image, words, (4, height + 3), _FONT, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
     for n, name in enumerate(missing):
-        center = (width + 12 + 13 * n, (height + 8) // 2)
-        cv2.circle(image, center, 4, _bgr(palette[name]), -1, cv2.LINE_AA)
+        center = (width + 15 + 16 * n, (height + 8) // 2)
+        cv2.circle(image, center, 6, _bgr(palette[name]), -1, cv2.LINE_AA)
 
 
 def _bgr(color: str) -> tuple[int, int, int]:
