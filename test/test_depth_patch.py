@@ -117,7 +117,7 @@ def test_an_occluder_that_enters_from_a_side_hides_the_target(side: str, hz: int
             hidden_at = percent
             break
         # As the trackers do while they go on: the target's own motion, or what looks like it.
-        patch.follow(found)
+        patch.follow(found, 1 / hz)
     assert hidden_at is not None
     assert 40 <= hidden_at <= 80
 
@@ -133,16 +133,39 @@ def test_a_target_that_walks_in_depth_is_not_hidden(hz: int, speed: float, remem
         assert not occluded(found), step
         assert found.value < 0.05
         if remembers:
-            patch.remember(centre_patch(depth, BOX, PARAMETERS.center_share))
+            patch.remember(centre_patch(depth, BOX, PARAMETERS.center_share), 1 / hz)
         else:
-            patch.follow(found)
+            patch.follow(found, 1 / hz)
     assert patch.depth == pytest.approx(TARGET - speed, abs=0.03)
+
+
+def test_a_standing_target_does_not_leap() -> None:
+    # At 5 Hz a walker could have come the 0.4 m; somebody who stood still could not.
+    patch = memory()
+    for _ in range(4):
+        patch.remember(centre_patch(scene(), BOX, PARAMETERS.center_share), 0.2)
+    depth = scene()
+    depth[60:220, 100:164] = TARGET - 0.4
+    assert occluded(difference(patch, depth, 0.2))
 
 
 def test_something_that_appears_all_at_once_is_no_walk() -> None:
     depth = scene()
     depth[60:220, 100:164] = OCCLUDER
     assert occluded(difference(memory(), depth, 1 / 30))
+
+
+def test_background_in_the_first_box_is_not_the_targets() -> None:
+    # More than half of the patch shows the wall: it neither hides the target nor is it missed.
+    wide = Box(BOX.x - 64, BOX.y, 192, BOX.height)
+    depth = scene()
+    patch = DepthPatch(0.2, 0.25, 2.0, 0.5)
+    patch.remember(centre_patch(depth, wide, 0.5))
+    assert patch.depth == pytest.approx(TARGET, abs=0.05)
+    nearer_wall = scene()
+    nearer_wall[nearer_wall > 4] = 2.0
+    assert not occluded(difference(patch, nearer_wall, box=wide))
+    assert occluded(difference(patch, np.full((300, 320), WALL, np.float32), box=wide))
 
 
 def test_a_target_that_went_away_is_not_there() -> None:

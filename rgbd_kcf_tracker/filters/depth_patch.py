@@ -12,8 +12,8 @@ Three things the thesis leaves open are decided here. A pixel without a reading 
 never counts. The patch is compared with the last one that surely showed the target, not with the
 frame before: an occluder that slides in slowly changes little from frame to frame, and one that
 stands still changes nothing. And a target may walk towards the camera: the shift that all pixels
-share is taken for its motion, as far as a walking person can have come in the time between two
-frames.
+share is taken for its motion, as far as a walking person can have come, sped up or slowed down in
+the time between two frames.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ from rgbd_kcf_tracker.features.depth_patch import Depth
 
 # Unevenness of a body and noise of the camera, metres.
 _NOISE = 0.1
+# What a walking person gathers or loses of speed, metres per second squared.
+_ACCELERATION = 3.0
+# By how much a walking body sways between two frames, metres.
+_JITTER = 0.03
+# Time over which the speed in depth is averaged.
+_SETTLING_S = 0.3
 # Half of what a body measures along the line of sight, arms included, metres.
 _BODY = 0.5
 # Share of the patch that must be left of a target for its motion to be read from it.
@@ -98,14 +104,20 @@ class DepthPatch:
         self._least_valid = least_valid
         self._patch: Depth | None = None
         self._depth: float | None = None
+        self._velocity: float | None = None
 
     @property
     def depth(self) -> float | None:
         """Distance of the target in metres when it was last followed; None where unknown."""
         return self._depth
 
-    def remember(self, patch: Depth) -> None:
-        """Take the patch of a target that is surely seen."""
+    def remember(self, patch: Depth, interval: float | None = None) -> None:
+        """Take the patch of a target that is surely seen.
+
+        Args:
+            patch: metres, of the newest frame.
+            interval: seconds since the frame before; None where the target was not seen in it.
+        """
         seen = patch[np.isfinite(patch)]
         if len(seen) < self._least_valid * patch.size:
             return
@@ -114,17 +126,33 @@ class DepthPatch:
             # The target is the nearer of what a box shows, even where it is the lesser part.
             depth = float(np.quantile(seen, _NEARER_PART))
         own = np.abs(patch - np.float32(depth)) <= _BODY
-        self._depth = float(np.median(patch[own]))
+        before, self._depth = self._depth, float(np.median(patch[own]))
+        self._learn_velocity(None if before is None else self._depth - before, interval)
         # Background between the limbs is not the target's: it is not compared. What lies outside
         # the image is: if it comes in, it comes at this depth.
         self._patch = np.where(own, patch, np.float32(np.nan))
         self._patch[np.isinf(patch)] = self._depth
 
-    def follow(self, difference: DepthDifference) -> None:
-        """Let the remembered depth go with the target's own motion."""
+    def follow(self, difference: DepthDifference, interval: float) -> None:
+        """Let the remembered depth go with the target's own motion over ``interval`` seconds."""
         if self._patch is not None and self._depth is not None:
             self._patch = self._patch + np.float32(difference.motion)
             self._depth += difference.motion
+            self._learn_velocity(difference.motion, interval)
+
+    def lose_velocity(self) -> None:
+        """Forget how fast the target moves in depth: it is not seen any more."""
+        self._velocity = None
+
+    def _learn_velocity(self, motion: float | None, interval: float | None) -> None:
+        if motion is None or not interval:
+            self._velocity = None
+            return
+        measured = float(np.clip(motion / interval, -self._speed, self._speed))
+        if self._velocity is None:
+            self._velocity = measured
+            return
+        self._velocity += (1 - np.exp(-interval / _SETTLING_S)) * (measured - self._velocity)
 
     def diff_at_centre(self, patch: Depth, interval: float) -> DepthDifference | None:
         """Compare a patch with the remembered one (the thesis's ``diff_at_centre``).
@@ -143,8 +171,8 @@ class DepthPatch:
         least = self._least_valid * change.size
         if np.count_nonzero(valid) < least:
             return None
-        reach = self._speed * interval
-        motion = self._motion(change[valid], reach)
+        low, high = self._reach(interval)
+        motion = self._motion(change[valid], low, high)
         change = np.where(valid, change - np.float32(motion), 0)
         # One pixel counts for so much and no more: what decides is how many there are.
         change = np.clip(change, -self._cap, self._cap)
@@ -167,16 +195,25 @@ class DepthPatch:
             cols=cols,
         )
 
-    def _motion(self, change: Depth, reach: float) -> float:
+    def _reach(self, interval: float) -> tuple[float, float]:
+        """Least and greatest motion in depth that the target can have made, metres."""
+        walk = self._speed * interval
+        if self._velocity is None or interval == 0:
+            return -walk, walk
+        expected = self._velocity * interval
+        slack = _ACCELERATION * interval**2 + _JITTER
+        return max(expected - slack, -walk), min(expected + slack, walk)
+
+    def _motion(self, change: Depth, low: float, high: float) -> float:
         """The shift that the target's own pixels share: those that it can have moved.
 
         Taken over all pixels it would be the background's, or an occluder's, as soon as they are
         the most, and then the target itself would seem to differ.
         """
-        own = change[np.abs(change) <= reach + _NOISE]
+        own = change[(change >= low - _NOISE) & (change <= high + _NOISE)]
         if len(own) < _OWN_SHARE * len(change):
-            return 0.0
-        return float(np.clip(np.median(own), -reach, reach))
+            return float(np.clip(0.0, low, high))
+        return float(np.clip(np.median(own), low, high))
 
     def _high(
         self, size: npt.NDArray[np.float32], valid: npt.NDArray[np.bool_], axis: int

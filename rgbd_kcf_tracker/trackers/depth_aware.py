@@ -192,6 +192,7 @@ class DepthAwareTracker(ABC):
         model: KcfModel,
         found: Detection,
         difference: DepthDifference | None,
+        interval: float,
     ) -> None:
         """Take the target's position; learn its look and depth there as far as they are its own.
 
@@ -208,9 +209,14 @@ class DepthAwareTracker(ABC):
             return
         if again or (trust >= 0.5 and found.response >= self._high):
             patch = centre_patch(frame.depth, self._box, self._depth_parameters.center_share)
-            self._depth_patch.remember(patch)
+            self._depth_patch.remember(patch, None if again else interval)
         elif difference is not None:
-            self._depth_patch.follow(difference)
+            self._depth_patch.follow(difference, interval)
+
+    def _hide(self) -> None:
+        """Step 17, and 19 of Algorithm 2: the target is hidden; its position is kept."""
+        self._hidden = True
+        self._depth_patch.lose_velocity()
 
     def _trust(self, difference: DepthDifference | None, response: float) -> float:
         """How much of a frame to learn: less, the more the depth, or else the response, differs."""

@@ -100,8 +100,8 @@ class RgbdTracker(DepthAwareTracker):
         for found in places:
             difference = self._diff_at_centre(frame, self._box_at(found), reach)
             if not self._occlusion_status(difference, found.response):
-                return self._partly_visible(frame, model, found, difference)
-        self._hidden = True
+                return self._partly_visible(frame, model, found, difference, interval)
+        self._hide()
         return None
 
     def _search(self, frame: Frame, model: KcfModel) -> tuple[Detection, Detection]:
@@ -156,12 +156,17 @@ class RgbdTracker(DepthAwareTracker):
     ) -> Detection:
         """Steps 11 to 13: a response above the threshold is the target, whatever the depth."""
         difference = self._diff_at_centre(frame, self._box_at(best), interval)
-        self._see(frame, model, best, difference)
+        self._see(frame, model, best, difference, interval)
         return best
 
     def _partly_visible(
-        self, frame: Frame, model: KcfModel, found: Detection, difference: DepthDifference | None
+        self,
+        frame: Frame,
+        model: KcfModel,
+        found: Detection,
+        difference: DepthDifference | None,
+        interval: float,
     ) -> Detection:
         """Step 16: the depth is still the target's, so go on at the updated position."""
-        self._see(frame, model, found, difference)
+        self._see(frame, model, found, difference, interval)
         return found

@@ -158,7 +158,7 @@ class RgbdPfTracker(DepthAwareTracker):
         difference = self._diff_at_centre(frame, self._box_at(here), interval)
         if self._occlusion_status(difference, here.response):
             # Step 19: the position is kept, nothing is learned, and no box is drawn.
-            self._hidden = True
+            self._hide()
             return None
         estimate = self._estimate(frame)
         there = self._detect_at(frame, model, [estimate])[0]
@@ -167,7 +167,7 @@ class RgbdPfTracker(DepthAwareTracker):
             return self._hold(frame, here.response)
         if found is there:
             difference = self._diff_at_centre(frame, self._box_at(there), interval)
-        self._see(frame, model, found, difference)
+        self._see(frame, model, found, difference, interval)
         self._observe(found)
         return found
 
@@ -263,7 +263,7 @@ class RgbdPfTracker(DepthAwareTracker):
         return not self._occlusion_status(difference, found.response)
 
     def _found_again(self, frame: Frame, model: KcfModel, found: Detection) -> Detection:
-        self._see(frame, model, found, None)
+        self._see(frame, model, found, None, 0.0)
         self._initiate_particles(self._box)
         return found
 
