@@ -97,6 +97,16 @@ class Silhouette:
     cut: Sides
     metres: tuple[float, float, float, float]
 
+    def at_edge(self, view: DepthView, rim: Rim) -> bool:
+        """True where it reaches the end of what the camera sees."""
+        rows, cols = view.shape
+        return (
+            self.left <= 1 + rim.left
+            or self.top <= 1 + rim.top
+            or self.cols.stop >= cols - 1 - rim.right
+            or self.rows.stop >= rows - 1 - rim.bottom
+        )
+
     @property
     def rows(self) -> slice:
         """Rows of the view that the crop covers."""

@@ -28,6 +28,10 @@ GROW_TIME = 0.4
 SHRINK_TIME = 4.0
 """Seconds in which the size follows what is seen: arms go out fast and a side view does not make a
 body smaller for long."""
+USUAL_TIME = 20.0
+"""Seconds over which the usual area is taken."""
+MOST_GROWTH = 1.7
+"""Area against the usual one from which a body has more likely run together with another."""
 COLOR_TIME = 1.0
 """Seconds in which the colours follow."""
 FIRST_LIKENESS = 0.9
@@ -77,6 +81,7 @@ class Body:
         self.width, self.height, self.area = first.width, first.height, first.area
         self.width_known = not (first.cut.left or first.cut.right)
         self.height_known = not (first.cut.top or first.cut.bottom)
+        self._usual_area = first.area
         self.likeness = FIRST_LIKENESS
         self._colors = np.zeros((BANDS, CODES), np.float32)
         self._around = np.full(CODES, 1 / CODES, np.float32)
@@ -187,20 +192,25 @@ class Body:
         def eased(old: float, new: float) -> float:
             return float(old * (new / old) ** (grow if new > old else shrink))
 
-        self.area = eased(self.area, seen.area)
+        self._usual_area *= (seen.area / self._usual_area) ** (1 - np.exp(-dt / USUAL_TIME))
+        self.area = min(eased(self.area, seen.area), MOST_GROWTH * self._usual_area)
         self.width = eased(self.width, seen.width)
         self.height = eased(self.height, seen.height)
 
     def grow(self, seen: Silhouette) -> None:
         """Take in more of a body that was cut off wherever it has been seen so far."""
         if not self.height_known:
-            self.area *= max(1.0, seen.height / self.height)
+            self._enlarge(seen.height / self.height)
             self.height = max(self.height, seen.height)
             self.height_known = not (seen.cut.top or seen.cut.bottom)
         if not self.width_known:
-            self.area *= max(1.0, seen.width / self.width)
+            self._enlarge(seen.width / self.width)
             self.width = max(self.width, seen.width)
             self.width_known = not (seen.cut.left or seen.cut.right)
+
+    def _enlarge(self, factor: float) -> None:
+        self.area *= max(1.0, factor)
+        self._usual_area *= max(1.0, factor)
 
     def learn_colors(self, placed: Placed, dt: float | None) -> None:
         """Follow the colours; ``dt`` seconds since the last time, None at first."""

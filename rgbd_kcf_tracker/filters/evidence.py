@@ -34,6 +34,8 @@ class Evidence:
         width: the same of its width.
         hidden: seconds since the target was last seen; 0 while it is followed.
         missing: True where the target should be in sight at the place where it is expected.
+        inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
+            candidate that does not touch the image's edge; 0 for one that does.
     """
 
     step: float
@@ -46,6 +48,7 @@ class Evidence:
     width: float
     hidden: float
     missing: bool
+    inland: float
 
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
@@ -74,6 +77,7 @@ class Evidence:
                 away * self.kin,
                 away * less,
                 float(self.missing),
+                away * self.inland,
                 1.0,
             )
         )
@@ -81,8 +85,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.753, -1.183, -0.080, -9.138, 5.203, -2.511, -1.516, -1.034, -3.566, 0.724, 0.020,
-        -0.342, -1.376, 0.149, -1.022, -0.344, 1.080, -0.645, 6.531,
+        -0.827, -1.471, -0.102, -10.785, 10.480, -1.218, -2.671, -2.637, -3.674, 0.639, -0.002,
+        -0.704, -1.254, 0.907, -2.326, 0.776, 1.143, -0.465, -2.991, 6.782,
     )
 )  # fmt: skip
 

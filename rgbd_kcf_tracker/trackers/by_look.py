@@ -34,6 +34,8 @@ SEARCH_WIDTH = 240
 PEAKS = 2
 DEPTH_SAMPLES = 24
 SAME_DEPTH = 0.15
+MOST = 0.6
+"""Share of readings in the middle of a box from which they are taken to be the target's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +187,7 @@ class ByLook:
 
 
 def depth_in(frame: Frame, box: Box) -> float | None:
-    """Median depth in the middle of a box in metres, None where there are hardly any readings."""
+    """Median depth in the middle of a box in metres, None where most of it has no reading."""
     if frame.depth is None:
         return None
     middle = box.scaled(0.5).clipped(frame.width, frame.height)
@@ -196,4 +198,4 @@ def depth_in(frame: Frame, box: Box) -> float | None:
         int(middle.y) : int(middle.bottom) + 1 : step, int(middle.x) : int(middle.right) + 1 : step
     ]
     valid = depth[depth > 0]
-    return float(np.median(valid)) if valid.size > 4 else None
+    return float(np.median(valid)) if valid.size > MOST * depth.size else None

@@ -37,6 +37,8 @@ GROWN, SHRUNK = 0.3, 0.35
 PLACED_MIDDLE = 0.4
 LEAN_WHOLE = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
+LEAVING = 0.5
+"""Seconds after the last sight in which a target is seen to leave the image."""
 FOOT = 0.2
 """Metres above the floor up to which a body is taken to stand on it."""
 
@@ -80,7 +82,7 @@ class BySurface:
         )
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
-        self.hidden_for = 0.0
+        self.hidden_for = self._gone = 0.0
         self.candidates: list[Candidate] = []
         self.body.learn_colors(placed, None)
         self._remember(scene, first)
@@ -152,7 +154,7 @@ class BySurface:
         Returns:
             The box of its visible part in pixels of the image.
         """
-        self.hidden_for = 0.0
+        self.hidden_for = self._gone = 0.0
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
         self._remember(scene, seen)
@@ -165,6 +167,8 @@ class BySurface:
 
     def miss(self, scene: Scene | None, dt: float) -> None:
         """Go on without having found the target."""
+        if scene is not None and self.hidden_for < LEAVING:
+            self._gone = max(self._gone, self._outside(scene))
         self.hidden_for += dt
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
         if scene is not None:
@@ -176,7 +180,7 @@ class BySurface:
         x = (box.cx / view.step - k.cx) * z / k.fx
         y = (box.y / view.step - k.cy) * z / k.fy
         self.motion.correct(np.array([x, y, z]), np.array([0.1, 0.1, 10.0]))
-        self.hidden_for = 0.0
+        self.hidden_for = self._gone = 0.0
 
     @staticmethod
     def outline(scene: Scene, seen: Silhouette) -> Box:
@@ -235,6 +239,7 @@ class BySurface:
             ),
             hidden=self.hidden_for,
             missing=missing,
+            inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 
@@ -271,6 +276,15 @@ class BySurface:
         """Share of the expected body that nothing nearer, no hole and no image edge hides."""
         depth, total = self._inside(scene)
         return np.count_nonzero(depth > self.motion.position[2] - 0.15) / total
+
+    def _outside(self, scene: Scene) -> float:
+        """Share of the expected body that lies beyond the left and right edges of the image."""
+        if self.motion.position[2] < 0.3:
+            return 1.0
+        left, _, right, _ = self._outline(scene.view)
+        first, last = scene.rim.left, scene.view.shape[1] - scene.rim.right
+        inside = min(right, last) - max(left, first)
+        return float(np.clip(1.0 - inside / max(right - left, 1.0), 0.0, 1.0))
 
     def without_depth(self, scene: Scene) -> float:
         """Share of the expected body, as far as it lies in the image, that has no reading."""
