@@ -73,6 +73,8 @@ def gray_window(
         (int(np.floor(center)) + 1) // step * step - side // (2 * step) * step - margin
         for center, side in ((cx, source[0]), (cy, source[1]))
     )
+    if not halves and source[0] * source[1] > _MOST_AT_ONCE:
+        return _sampled(color, left, top, source, target)
     cropped = cut(color, left, top, source[0] + 2 * margin, source[1] + 2 * margin)
     gray: npt.NDArray[np.uint8] = cv2.cvtColor(np.ascontiguousarray(cropped), cv2.COLOR_BGR2GRAY)
     if halves:
@@ -83,6 +85,26 @@ def gray_window(
     how = cv2.INTER_AREA if target[0] < source[0] else cv2.INTER_LINEAR
     resampled: npt.NDArray[np.uint8] = cv2.resize(gray, target, interpolation=how)
     return resampled
+
+
+# Windows of more pixels than this are sampled, not averaged.
+_MOST_AT_ONCE = 16_000_000
+
+
+def _sampled(
+    color: npt.NDArray[np.uint8],
+    left: int,
+    top: int,
+    source: tuple[int, int],
+    target: tuple[int, int],
+) -> npt.NDArray[np.uint8]:
+    """A window far larger than the image, at the middle of each of its pixels."""
+    rows = top + ((np.arange(target[1]) + 0.5) * source[1] / target[1]).astype(np.int64)
+    cols = left + ((np.arange(target[0]) + 0.5) * source[0] / target[0]).astype(np.int64)
+    row = np.clip(rows, 0, color.shape[0] - 1)
+    col = np.clip(cols, 0, color.shape[1] - 1)
+    gray: npt.NDArray[np.uint8] = cv2.cvtColor(color[row[:, None], col], cv2.COLOR_BGR2GRAY)
+    return gray
 
 
 # Keys' cubic (a = -1/2) stretched to twice its width, at half-pixel distances: the antialiased
