@@ -172,7 +172,8 @@ def test_a_first_box_outside_is_refused(box: Box) -> None:
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize('variant', ['kcf', 'rgbd', 'rgbd_pf'])
 @pytest.mark.parametrize(
-    'box', [Box(-1e6, -1e6, 2.1e6, 2.1e6), Box(-2000, 100, 9000, 3), Box(9, -9, 1, 1e7)]
+    'box',
+    [Box(-1e6, -1e6, 2.1e6, 2.1e6), Box(-2000, 100, 9000, 3), Box(9, -9, 1, 1e7)],
 )
 def test_a_box_of_absurd_size_takes_neither_memory_nor_time(variant: str, box: Box) -> None:
     tracker = create_tracker(variant)
