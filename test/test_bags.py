@@ -476,6 +476,30 @@ def test_convert_mends_a_bag_that_was_cut_off(tmp_path: Path) -> None:
     assert not any('cut off' in w for w in warnings)
 
 
+@pytest.mark.parametrize('kind', ['mcap lz4', 'mcap zstd'])
+def test_a_damaged_chunk_costs_what_is_in_it(kind: str, tmp_path: Path) -> None:
+    """An error names the frame; convert leaves the chunk out."""
+    frames = make_frames(8, (320, 240))
+    path = WRITERS[kind](tmp_path, camera_messages(frames))
+    data = bytearray(path.read_bytes())
+    # Noise cannot be packed and stands there as it is.
+    at = data.index(frames[3].color.tobytes()[100_000:100_016])
+    data[at : at + 2000] = bytes(2000)
+    path.write_bytes(data)
+    with pytest.raises(ImageError, match=r'frame \d of .*rgbd-kcf convert writes a bag without'):
+        read(path)
+    bag = RawBag(path)
+    count, warnings = copy_bag(bag, tmp_path / 'mended.mcap')
+    bag.close()
+    assert 18 <= count < 24
+    assert any('is left out' in w for w in warnings)
+    found, _ = read(tmp_path / 'mended.mcap')
+    whole = [f for f in found if f.depth is not None]
+    assert len(whole) >= 5
+    by_stamp = {f.stamp_ns: f for f in frames}
+    assert_same_frames(whole, [by_stamp[f.stamp_ns] for f in whole])
+
+
 def test_missing_index(tmp_path: Path) -> None:
     """The summary of an mcap, or the index of a ROS 1 bag, is taken away."""
     path = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
+from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.containers import JPEG, inspect, sniff
@@ -216,9 +216,10 @@ class BagRecording:
             msg = self.bag.message(self._color, index)
             return decode_compressed_color(msg) if _compressed(self._color) else decode_color(msg)
         except RgbdKcfError as error:
-            raise ImageError(
-                f'{self.path}, frame {number} of {self.topics.color}: {error}'
-            ) from None
+            where = f'{self.path}, frame {number} of {self.topics.color}'
+            mend = ' (rgbd-kcf convert writes a bag without what cannot be read)'
+            hint = mend if isinstance(error, RecordingError) else ''
+            raise ImageError(f'{where}: {error}{hint}') from None
 
     def _read_depth(self, index: int, number: int) -> DepthImage | None:
         assert self._depth is not None

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import struct
+import zlib
 from collections import OrderedDict
 from collections.abc import Iterator
 from io import BytesIO
@@ -73,8 +74,8 @@ class McapStorage:
         self.warnings: list[str] = []
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
-        # Place of a compressed chunk: method, place of its data, their length, unpacked length.
-        self._chunks: dict[int, tuple[str, int, int, int]] = {}
+        # Place of a packed chunk: method, place of its data, their length, unpacked length, CRC.
+        self._chunks: dict[int, tuple[str, int, int, int, int]] = {}
         self._cache: OrderedDict[int, bytes] = OrderedDict()
         try:
             self._file = _File(path)
@@ -156,7 +157,7 @@ class McapStorage:
     def _chunk(self, body: int, available: int) -> Iterator[Scanned]:
         head = self._file.read(body, min(available, _CHUNK_HEAD.size + 64))
         try:
-            _, _, size, _ = _CHUNK_HEAD.unpack_from(head)
+            _, _, size, crc = _CHUNK_HEAD.unpack_from(head)
             (name_length,) = struct.unpack_from('<I', head, _CHUNK_HEAD.size)
             at = _CHUNK_HEAD.size + 4 + name_length
             method = head[_CHUNK_HEAD.size + 4 : at].decode('ascii')
@@ -169,7 +170,7 @@ class McapStorage:
         if method == '':
             yield from self._inside(self._file, data, data + packed, None)
             return
-        self._chunks[body] = (method, data, packed, size)
+        self._chunks[body] = (method, data, packed, size, crc)
         try:
             memory: _Memory | Unpacker
             if whole:
@@ -227,8 +228,11 @@ class McapStorage:
         if chunk in self._cache:
             self._cache.move_to_end(chunk)
             return self._cache[chunk]
-        method, at, length, size = self._chunks[chunk]
+        method, at, length, size, crc = self._chunks[chunk]
         data = unpack(method, self._file.read(at, length), size)
+        # A chunk that was cut off is shorter, and what there is of it is taken.
+        if crc and len(data) == size and zlib.crc32(data) != crc:
+            raise RecordingError(f'{self.path}: the chunk at byte {chunk} is damaged (wrong CRC)')
         self._cache[chunk] = data
         while len(self._cache) > _CACHED_CHUNKS:
             self._cache.popitem(last=False)
