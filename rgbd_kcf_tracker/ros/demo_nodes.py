@@ -17,7 +17,7 @@ from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
-STOP_S = 5.0
+STOP_S = 20.0
 
 
 class DemoError(RgbdKcfError):
