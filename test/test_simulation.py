@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -381,3 +382,9 @@ def test_asked_scenarios_are_there() -> None:
     }  # fmt: skip
     assert asked <= set(SCENARIOS)
     assert all(s.description and s.name == name for name, s in SCENARIOS.items())
+
+
+def test_every_scenario_is_documented() -> None:
+    page = (Path(__file__).parent.parent / 'docs' / 'simulation.md').read_text()
+    for name, scenario in SCENARIOS.items():
+        assert f'| `{name}` | {scenario.description} |' in page

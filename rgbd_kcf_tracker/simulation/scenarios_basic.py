@@ -29,7 +29,9 @@ def stroll(
 def normal(stage: Stage) -> Scene:
     """The thesis's normal case."""
     way = stroll(stage, stage.uniform(0.6, 1.3), int(stage.rng.integers(2, 4)), z=(1.7, 4.3))
-    return stage.scene([stage.walk(stage.person(), way)], min(way[-1][0] + 0.5, 8.0))
+    return stage.scene(
+        [stage.walk(stage.person(), way), *stage.extras(0.3)], min(way[-1][0] + 0.5, 8.0)
+    )
 
 
 @scenario('a cluttered room and people standing behind the target')
@@ -62,7 +64,9 @@ def deformation(stage: Stage) -> Scene:
 def motion(stage: Stage) -> Scene:
     """The thesis's fast motion."""
     way = stroll(stage, stage.uniform(1.8, 2.6), 4, wide=0.8)
-    return stage.scene([stage.walk(stage.person(), way)], min(way[-1][0] + 0.4, 8.0))
+    return stage.scene(
+        [stage.walk(stage.person(), way), *stage.extras(0.3)], min(way[-1][0] + 0.4, 8.0)
+    )
 
 
 @scenario('a person runs across the view within about a second, with motion blur, and back')
@@ -76,7 +80,7 @@ def fast_motion(stage: Stage) -> Scene:
               (3.2 + 3 * dash, right, z)]  # fmt: skip
     actor = stage.walk(stage.person(), points)
     sensor = stage.sensor(exposure_s=stage.uniform(0.015, 0.028))
-    return stage.scene([actor], 3.8 + 3 * dash, sensor=sensor)
+    return stage.scene([actor, *stage.extras(0.3)], 3.8 + 3 * dash, sensor=sensor)
 
 
 @scenario('a person walks towards the camera at 1.5 m/s, from 5 m to 0.8 m')
@@ -87,7 +91,8 @@ def approach(stage: Stage) -> Scene:
     start, end = stage.x(stage.uniform(-0.4, 0.4), far), stage.x(stage.uniform(-0.25, 0.25), near)
     speed = stage.uniform(1.3, 1.6)
     way = route([(start, far), (start, far), (end, near)], speed)
-    return stage.scene([stage.walk(stage.person(), way)], way[-1][0] + 1.0)
+    cast = [stage.walk(stage.person(), way), *stage.extras(0.3)]
+    return stage.scene(cast, way[-1][0] + 1.0)
 
 
 @scenario('a person walks away from the camera at 1.5 m/s, from 0.9 m to 5 m')
@@ -123,7 +128,8 @@ def light_change(stage: Stage) -> Scene:
         g = lamp * exposure
         return g * (1 - tint * dark), g, g * (1 + tint * dark)
 
-    return stage.scene([stage.walk(stage.person(), way)], duration, light=light)
+    cast = [stage.walk(stage.person(), way), *stage.extras(0.3)]
+    return stage.scene(cast, duration, light=light)
 
 
 @scenario('the camera shakes in a hand or pans slowly while the target walks')
@@ -136,7 +142,9 @@ def camera_motion(stage: Stage) -> Scene:
     shake = stage.uniform(0.004, 0.012) if stage.rng.uniform() < 0.7 else 0.0
     camera = CameraMotion(stage.camera_height, stage.pitch, keys, shake=shake,
                           waves=hand_waves(stage.rng))  # fmt: skip
-    return stage.scene([stage.walk(stage.person(), way)], duration, camera=camera)
+    return stage.scene(
+        [stage.walk(stage.person(), way), *stage.extras(0.3)], duration, camera=camera
+    )
 
 
 @scenario('the target is cut by the border of the picture, close to the camera')

@@ -21,7 +21,11 @@ def _behind(
     room = stage.room()
     stage.occluder(room, stage.x(at, near), near, width, stage.uniform(*height))
     side = stage.sign()
-    points: list[Point] = [(stage.x(at + s * side, far), far) for s in way_shares]
+    slope = stage.uniform(-0.35, 0.35)  # the way leads a little nearer or farther
+    points: list[Point] = []
+    for share in way_shares:
+        z = far + slope * share
+        points.append((stage.x(at + share * side, z), z))
     return points, stage.uniform(*speed), stage.scene([], 1.0, room=room)
 
 
@@ -40,7 +44,7 @@ def occlusion(stage: Stage) -> Scene:
         at=stage.uniform(-0.15, 0.15),
     )  # fmt: skip
     way = route(points, speed)
-    scene.actors = [stage.walk(stage.person(), way)]
+    scene.actors = [stage.walk(stage.person(), way), *stage.extras()]
     scene.duration_s = way[-1][0] + 0.5
     return scene
 
@@ -51,7 +55,7 @@ def turn_back(stage: Stage) -> Scene:
     points, speed, scene = _behind(stage, way_shares=[-0.75, 0.0, 0.0, 0.0, -0.8],
                                    width=stage.uniform(0.9, 1.3))  # fmt: skip
     way = route(points, speed)
-    scene.actors = [stage.walk(stage.person(), way)]
+    scene.actors = [stage.walk(stage.person(), way), *stage.extras()]
     scene.duration_s = way[-1][0] + 0.8
     return scene
 
@@ -65,7 +69,7 @@ def long_occlusion(stage: Stage) -> Scene:
     there = route(points[:2], speed)
     pause = stage.uniform(2.5, 4.0)
     back = route(points[1:], speed, there[-1][0] + pause)
-    scene.actors = [stage.walk(stage.person(), there + back)]
+    scene.actors = [stage.walk(stage.person(), there + back), *stage.extras()]
     scene.duration_s = back[-1][0] + 1.5
     return scene
 
@@ -109,7 +113,7 @@ def crossing(stage: Stage) -> Scene:
     ]
     cast: list[Actor] = [stage.walk(stage.person(), way)]
     cast += [stage.walk(stage.tall_person(), keys) for keys in others]
-    return stage.scene(cast, end + 0.5)
+    return stage.scene([*cast, *stage.extras(0.3)], end + 0.5)
 
 
 @scenario('somebody passes before a standing target, and back, and may stop there')
@@ -130,7 +134,7 @@ def passer_by(stage: Stage) -> Scene:
                    channels=channels),
         stage.walk(stage.tall_person(), there + on + back),
     ]  # fmt: skip
-    return stage.scene(cast, min(back[-1][0], 9.0))
+    return stage.scene([*cast, *stage.extras()], min(back[-1][0], 9.0))
 
 
 @scenario('a hand-held camera, a walking target, and a passer-by who hides it')
@@ -165,7 +169,7 @@ def behind_box(stage: Stage) -> Scene:
         box,
         stage.walk(stage.person(), pusher, channels={'reach': [(0, 0.8)]}),
     ]
-    return stage.scene(cast, min(way[-1][0], 8.0))
+    return stage.scene([*cast, *stage.extras(0.3)], min(way[-1][0], 8.0))
 
 
 @scenario('the target ducks behind an armchair close to the camera')
@@ -202,7 +206,7 @@ def behind_person(stage: Stage) -> Scene:
         stage.walk(stage.tall_person(), [(0, stage.x(at, near), near)],
                    heading=[(0, stage.uniform(-3, 3))]),
     ]  # fmt: skip
-    return stage.scene(cast, way[-1][0] + 0.8)
+    return stage.scene([*cast, *stage.extras(0.3)], way[-1][0] + 0.8)
 
 
 @scenario('somebody walks so close before the target that the two touch')
@@ -230,7 +234,7 @@ def out_of_view(stage: Stage) -> Scene:
     z, side = stage.uniform(2.2, 3.2), stage.sign()
     points: list[Point] = [(stage.x(side * s, z), z) for s in (-0.3, 1.4, 1.4, 1.4, -0.4)]
     way = route(points, stage.uniform(0.9, 1.3))
-    return stage.scene([stage.walk(stage.person(), way)], way[-1][0] + 0.5)
+    return stage.scene([stage.walk(stage.person(), way), *stage.extras()], way[-1][0] + 0.5)
 
 
 @scenario('the target leaves the view and returns through the other edge')
@@ -243,7 +247,9 @@ def other_edge(stage: Stage) -> Scene:
     far = stage.uniform(2.0, 3.4)
     unseen = [(t + 0.3, stage.x(side * 1.6, z), -1.0), (t + 0.8, stage.x(-side * 1.6, far), -1.0)]
     last = route([(stage.x(side * s, far), far) for s in (-1.5, 0.3, 0.5)], speed, t + 1.1)
-    return stage.scene([stage.walk(stage.person(), first + unseen + last)], last[-1][0] + 0.5)
+    return stage.scene(
+        [stage.walk(stage.person(), first + unseen + last), *stage.extras()], last[-1][0] + 0.5
+    )
 
 
 @scenario('the target goes behind a box while somebody in the same clothes walks out')

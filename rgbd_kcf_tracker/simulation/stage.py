@@ -121,6 +121,13 @@ class Stage:
         return self.walk(self.person(), [(0, self.x(self.uniform(*share), far), far)],
                          heading=[(0, self.uniform(-3, 3))])  # fmt: skip
 
+    def extras(self, likely: float = 0.4) -> list[Actor]:
+        """Perhaps one or two people who stand in the background."""
+        if self.rng.uniform() > likely:
+            return []
+        count = int(self.rng.integers(1, 3))
+        return [self.bystander((4.2, self.depth - 0.6), (-0.85, 0.85)) for _ in range(count)]
+
     def pushed_box(
         self, points: Timed, size: tuple[float, float, float], skin: str = 'cupboard'
     ) -> FacesActor:
