@@ -5,24 +5,26 @@
 
 from __future__ import annotations
 
-import statistics
-from array import array
 from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.recordings.containers import JPEG, inspect, sniff
+from rgbd_kcf_tracker.recordings.bag_pairing import pair_topics
+from rgbd_kcf_tracker.recordings.bag_topics import (
+    COMPRESSED,
+    INFO,
+    POLYGON,
+    TRUTH_TOPICS,
+    describe_streams,
+    look_at_images,
+    rate_of,
+)
 from rgbd_kcf_tracker.recordings.images import (
-    COLOR_ENCODINGS,
-    DEPTH_ENCODINGS,
     ColorImage,
     DepthImage,
-    as_bytes,
     decode_color,
     decode_compressed_color,
     decode_compressed_depth,
@@ -32,20 +34,11 @@ from rgbd_kcf_tracker.recordings.messages import (
     box_from_polygon,
     intrinsics_from_info,
 )
-from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S, Pair, StampPairer
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
-from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
+from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
-from rgbd_kcf_tracker.recordings.topics import ChosenTopics, ImageTopic, choose_topics
-
-TRUTH_TOPICS = ('/groundtruth/visible', '/groundtruth/body')
-_IMAGE, _COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
-_INFO, _POLYGON = 'sensor_msgs/msg/CameraInfo', 'geometry_msgs/msg/PolygonStamped'
-_WIDEST_S = 0.5
-_JUMP_NS = 1_000_000_000
-
-FramePair = Pair[int, int]
+from rgbd_kcf_tracker.recordings.topics import ChosenTopics, choose_topics
 
 
 class BagRecording:
@@ -65,7 +58,8 @@ class BagRecording:
             self.topics = self._choose(options)
             self._color = self.bag.topics[self.topics.color]
             self._depth = None if self.topics.depth is None else self.bag.topics[self.topics.depth]
-            self._pairs = self._pair(options)
+            self._pairs, told = pair_topics(self._color, self._depth, options.tolerance_s)
+            self.warnings += told
             self.intrinsics = options.intrinsics or self._read_intrinsics()
             self.groundtruth = self._read_truth(TRUTH_TOPICS[0])
             self.groundtruth_body = known(self._read_truth(TRUTH_TOPICS[1]))
@@ -117,7 +111,7 @@ class BagRecording:
             frames=len(self),
             frames_with_depth=sum(p.depth is not None for p in self._pairs),
             duration_s=(max(stamps) - min(stamps)) / 1e9 if stamps else 0.0,
-            rate_hz=_rate(stamps),
+            rate_hz=rate_of(stamps),
             streams=describe_streams(self.bag, self._images, self.topics),
             intrinsics=self.intrinsics,
             truth_frames=None if truth is None else sum(b is not None for b in truth),
@@ -143,73 +137,13 @@ class BagRecording:
         topics = self.bag.topics.values()
         return choose_topics(
             self._images,
-            [t.name for t in topics if t.type == _INFO and len(t)],
+            [t.name for t in topics if t.type == INFO and len(t)],
             {t.name: f'{t.type}, {len(t)} messages' for t in topics},
             str(self.path),
             options.color_topic,
             options.depth_topic,
             options.info_topic,
         )
-
-    def _pair(self, options: ReadOptions) -> list[FramePair]:
-        color_stamps = self._stamps(self._color)
-        if self._depth is None:
-            depth_stamps = array('q')
-        else:
-            depth_stamps = self._stamps(self._depth)
-            if (color_stamps is self._color.log_ns) != (depth_stamps is self._depth.log_ns):
-                color_stamps, depth_stamps = self._color.log_ns, self._depth.log_ns
-        events = _in_time_order(
-            (color_stamps, self._color.log_ns),
-            (depth_stamps, array('q') if self._depth is None else self._depth.log_ns),
-        )
-        tolerance = DEFAULT_TOLERANCE_S if options.tolerance_s is None else options.tolerance_s
-        pairs, pairer = _run_pairer(events, tolerance)
-        if options.tolerance_s is None and depth_stamps and all(p.depth is None for p in pairs):
-            wider, wider_pairer = _run_pairer(events, _WIDEST_S)
-            distances = [
-                abs(p.depth_stamp_ns - p.stamp_ns) for p in wider if p.depth_stamp_ns is not None
-            ]
-            if distances:
-                pairs, pairer = wider, wider_pairer
-                self.warnings.append(
-                    f'no depth image is within {tolerance * 1e3:g} ms of a colour image: paired '
-                    f'up to {max(distances) / 1e6:.0f} ms apart (set the limit with --tolerance)'
-                )
-        self._warn_of_pairing(pairs, pairer)
-        return pairs
-
-    def _stamps(self, topic: Topic) -> array[int]:
-        stamps = topic.stamp_ns
-        if (len(stamps) > 1 and len(set(stamps)) == 1) or not any(stamps):
-            self.warnings.append(
-                f'{topic.name}: all stamps are {stamps[0] if stamps else 0}: '
-                'the time of recording is taken'
-            )
-            return topic.log_ns
-        return stamps
-
-    def _warn_of_pairing(self, pairs: list[FramePair], pairer: StampPairer[int, int]) -> None:
-        counts = pairer.counts
-        if counts.jumps_back:
-            self.warnings.append(
-                f'time jumps back {counts.jumps_back} times in {self.topics.color}: '
-                'frames stay in the order of recording there'
-            )
-        if counts.duplicates:
-            self.warnings.append(
-                f'{counts.duplicates} images have a stamp that was there before and are left out'
-            )
-        if self._depth is None:
-            return
-        alone = sum(p.depth is None for p in pairs)
-        if alone:
-            self.warnings.append(
-                f'{alone} of {len(pairs)} colour images have no depth image near enough '
-                'and are read without depth'
-            )
-        if counts.depth_alone:
-            self.warnings.append(f'{counts.depth_alone} depth images belong to no colour image')
 
     def _read_color(self, index: int, number: int) -> ColorImage:
         try:
@@ -263,7 +197,7 @@ class BagRecording:
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         topic = self.bag.topics.get(name)
-        if topic is None or topic.type != _POLYGON or not len(topic):
+        if topic is None or topic.type != POLYGON or not len(topic):
             return None
         boxes: dict[int, Box | None] = {}
         for index, stamp in enumerate(topic.stamp_ns):
@@ -306,133 +240,5 @@ def describe_bag(path: Path, problem: str) -> RecordingInfo:
         bag.close()
 
 
-def look_at_images(bag: RawBag) -> list[ImageTopic]:
-    """:func:`look_at` for every image topic with messages."""
-    return [
-        look_at(bag, topic)
-        for topic in bag.topics.values()
-        if topic.type in (_IMAGE, _COMPRESSED) and len(topic)
-    ]
-
-
-def look_at(bag: RawBag, topic: Topic) -> ImageTopic:
-    """What the first message of an image topic tells of it."""
-    by_name = 'depth' if 'depth' in topic.name else 'color'
-    try:
-        msg = bag.message(topic, 0)
-        if topic.type == _IMAGE:
-            encoding = str(msg.encoding)
-            role = (
-                'color'
-                if encoding in COLOR_ENCODINGS
-                else 'depth'
-                if encoding in DEPTH_ENCODINGS
-                else by_name
-            )
-            return ImageTopic(topic.name, role, (int(msg.width), int(msg.height)), encoding)
-        return _look_at_compressed(topic, msg, by_name)
-    except RgbdKcfError:
-        return ImageTopic(topic.name, by_name)
-
-
-def _look_at_compressed(topic: Topic, msg: Any, by_name: str) -> ImageTopic:
-    text = str(msg.format)
-    data = as_bytes(msg.data)
-    kind = sniff(data)
-    if kind is None:
-        if 'theora' in topic.name or len(data) < 12:
-            return ImageTopic(topic.name, '', None, text)
-        size: tuple[int, int] | None = None
-        try:
-            shape = decode_compressed_depth(msg).shape
-            size = shape[1], shape[0]
-        except ImageError:
-            pass
-        return ImageTopic(topic.name, 'depth', size, text)
-    head = inspect(data)
-    size = head.width, head.height
-    if head.channels == 1 and head.bits in (16, 32):
-        return ImageTopic(topic.name, 'depth', size, text)
-    if kind == JPEG and by_name == 'depth':
-        return ImageTopic(topic.name, '', size, f'{text} (JPEG, which spoils depth)')
-    return ImageTopic(topic.name, 'color', size, text)
-
-
-def describe_streams(
-    bag: RawBag, images: list[ImageTopic], chosen: ChosenTopics | None
-) -> tuple[StreamInfo, ...]:
-    """All topics of a bag, for :meth:`Recording.info`."""
-    looked = {i.name: i for i in images}
-    roles: dict[str | None, str] = {}
-    if chosen is not None:
-        roles = {chosen.color: 'color', chosen.depth: 'depth', chosen.info: 'info'}
-    roles |= dict.fromkeys(TRUTH_TOPICS, 'truth')
-    streams = []
-    for topic in bag.topics.values():
-        image = looked.get(topic.name)
-        streams.append(
-            StreamInfo(
-                topic.name,
-                topic.type,
-                len(topic),
-                _rate(topic.log_ns),
-                None if image is None else image.size,
-                '' if image is None else image.encoding,
-                roles.get(topic.name, ''),
-            )
-        )
-    return tuple(streams)
-
-
 def _compressed(topic: Topic) -> bool:
-    return topic.type == _COMPRESSED
-
-
-def _rate(stamps: Any) -> float | None:
-    gaps = [b - a for a, b in pairwise(stamps) if b > a]
-    return 1e9 / statistics.median(gaps) if gaps else None
-
-
-def _run_pairer(
-    events: list[tuple[bool, int, int]], tolerance_s: float
-) -> tuple[list[FramePair], StampPairer[int, int]]:
-    pairer: StampPairer[int, int] = StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0)
-    pairs: list[FramePair] = []
-    for is_color, stamp, index in events:
-        pairs += pairer.add_color(stamp, index) if is_color else pairer.add_depth(stamp, index)
-    return pairs + pairer.flush(), pairer
-
-
-def _in_time_order(
-    color: tuple[array[int], array[int]], depth: tuple[array[int], array[int]]
-) -> list[tuple[bool, int, int]]:
-    """``(is colour, stamp, index)`` of both streams, by stamp between the jumps back of time.
-
-    Messages that changed places while they were recorded are put right; where time jumps back (a
-    bag of a bag that looped) what comes after stays after.
-    """
-    streams = []
-    for is_color, (stamps, logged) in ((True, color), (False, depth)):
-        segments = _segments(stamps)
-        streams.append(
-            [(segments[i], stamps[i], is_color, i, logged[i]) for i in range(len(stamps))]
-        )
-    counts = [stream[-1][0] if stream else None for stream in streams]
-    events = streams[0] + streams[1]
-    if None in counts or counts[0] == counts[1]:
-        events.sort(key=lambda e: (e[0], e[1], e[2]))
-    else:
-        events.sort(key=lambda e: (e[4], e[2]))
-    return [(is_color, stamp, index) for _, stamp, is_color, index, _ in events]
-
-
-def _segments(stamps: array[int]) -> list[int]:
-    segment, newest = 0, -(1 << 62)
-    out = []
-    for stamp in stamps:
-        if stamp < newest - _JUMP_NS:
-            segment += 1
-            newest = stamp
-        newest = max(newest, stamp)
-        out.append(segment)
-    return out
+    return topic.type == COMPRESSED

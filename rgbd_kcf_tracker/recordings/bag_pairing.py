@@ -1,0 +1,143 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The colour and depth messages of a bag as pairs, from the index of their stamps alone."""
+
+from __future__ import annotations
+
+from array import array
+
+from rgbd_kcf_tracker.recordings.pairing import (
+    DEFAULT_TOLERANCE_S,
+    Pair,
+    PairingCounts,
+    StampPairer,
+)
+from rgbd_kcf_tracker.recordings.storage import Topic
+
+FramePair = Pair[int, int]
+"""Numbers of a colour and a depth message within their topics."""
+
+_WIDEST_S = 0.5
+_JUMP_NS = 1_000_000_000
+
+
+def pair_topics(
+    color: Topic, depth: Topic | None, tolerance_s: float | None
+) -> tuple[list[FramePair], list[str]]:
+    """Every colour message with the depth that belongs to it, in time order.
+
+    Args:
+        color: the colour topic.
+        depth: the depth topic, None for colour alone.
+        tolerance_s: see :class:`ReadOptions`; None widens it where nothing is near enough.
+
+    Returns:
+        The pairs, and warnings about what was odd.
+    """
+    warnings: list[str] = []
+    nothing = array('q')
+    color_stamps = _stamps(color, warnings)
+    depth_stamps = nothing if depth is None else _stamps(depth, warnings)
+    # Both by one clock.
+    if depth is not None and (color_stamps is color.log_ns) != (depth_stamps is depth.log_ns):
+        color_stamps, depth_stamps = color.log_ns, depth.log_ns
+    logged = nothing if depth is None else depth.log_ns
+    events = _in_time_order((color_stamps, color.log_ns), (depth_stamps, logged))
+    tolerance = DEFAULT_TOLERANCE_S if tolerance_s is None else tolerance_s
+    pairs, counts = _run_pairer(events, tolerance)
+    if tolerance_s is None and depth_stamps and all(p.depth is None for p in pairs):
+        wider, wider_counts = _run_pairer(events, _WIDEST_S)
+        distances = [
+            abs(p.depth_stamp_ns - p.stamp_ns) for p in wider if p.depth_stamp_ns is not None
+        ]
+        if distances:
+            pairs, counts = wider, wider_counts
+            warnings.append(
+                f'no depth image is within {tolerance * 1e3:g} ms of a colour image: paired '
+                f'up to {max(distances) / 1e6:.0f} ms apart (set the limit with --tolerance)'
+            )
+    return pairs, warnings + _oddities(color, depth, pairs, counts)
+
+
+def _stamps(topic: Topic, warnings: list[str]) -> array[int]:
+    """Stamps of the headers, or the times of recording where those say nothing."""
+    stamps = topic.stamp_ns
+    if stamps == topic.log_ns or (any(stamps) and (len(stamps) == 1 or len(set(stamps)) > 1)):
+        return stamps
+    warnings.append(
+        f'{topic.name}: all stamps are {stamps[0] if stamps else 0}: the time of recording is taken'
+    )
+    return topic.log_ns
+
+
+def _oddities(
+    color: Topic, depth: Topic | None, pairs: list[FramePair], counts: PairingCounts
+) -> list[str]:
+    out = []
+    if counts.jumps_back:
+        out.append(
+            f'time jumps back {counts.jumps_back} times in {color.name}: '
+            'frames stay in the order of recording there'
+        )
+    if counts.duplicates:
+        out.append(
+            f'{counts.duplicates} images have a stamp that was there before and are left out'
+        )
+    if depth is None:
+        return out
+    alone = sum(p.depth is None for p in pairs)
+    if alone:
+        out.append(
+            f'{alone} of {len(pairs)} colour images have no depth image near enough '
+            'and are read without depth'
+        )
+    if counts.depth_alone:
+        out.append(f'{counts.depth_alone} depth images belong to no colour image')
+    return out
+
+
+def _run_pairer(
+    events: list[tuple[bool, int, int]], tolerance_s: float
+) -> tuple[list[FramePair], PairingCounts]:
+    pairer: StampPairer[int, int] = StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0)
+    pairs: list[FramePair] = []
+    for is_color, stamp, index in events:
+        pairs += pairer.add_color(stamp, index) if is_color else pairer.add_depth(stamp, index)
+    pairs += pairer.flush()
+    return pairs, pairer.counts
+
+
+def _in_time_order(
+    color: tuple[array[int], array[int]], depth: tuple[array[int], array[int]]
+) -> list[tuple[bool, int, int]]:
+    """``(is colour, stamp, index)`` of both streams, by stamp between the jumps back of time.
+
+    Messages that changed places while they were recorded are put right; where time jumps back (a
+    bag of a bag that looped) what comes after stays after.
+    """
+    streams = []
+    for is_color, (stamps, logged) in ((True, color), (False, depth)):
+        segments = _segments(stamps)
+        streams.append(
+            [(segments[i], stamps[i], is_color, i, logged[i]) for i in range(len(stamps))]
+        )
+    counts = [stream[-1][0] if stream else None for stream in streams]
+    events = streams[0] + streams[1]
+    if None in counts or counts[0] == counts[1]:
+        events.sort(key=lambda e: (e[0], e[1], e[2]))
+    else:
+        events.sort(key=lambda e: (e[4], e[2]))
+    return [(is_color, stamp, index) for _, stamp, is_color, index, _ in events]
+
+
+def _segments(stamps: array[int]) -> list[int]:
+    segment, newest = 0, -(1 << 62)
+    out = []
+    for stamp in stamps:
+        if stamp < newest - _JUMP_NS:
+            segment += 1
+            newest = stamp
+        newest = max(newest, stamp)
+        out.append(segment)
+    return out
