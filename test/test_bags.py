@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -392,6 +394,37 @@ def test_metadata_that_lies_is_left_out(tmp_path: Path) -> None:
     frames, warnings = read(folder)
     assert_same_frames(frames, FRAMES)
     assert any('cannot be understood' in w for w in warnings)
+
+
+def test_a_file_that_metadata_names_is_missing(tmp_path: Path) -> None:
+    folder = write_rosbag2(tmp_path / 'a', camera_messages(FRAMES))
+    text = (folder / 'metadata.yaml').read_text().replace('a.mcap', 'b.mcap')
+    (folder / 'metadata.yaml').write_text(text)
+    frames, warnings = read(folder)
+    assert_same_frames(frames, FRAMES)
+    assert any('names b.mcap, which is not there' in w for w in warnings)
+
+
+def test_a_database_that_was_never_checkpointed(tmp_path: Path) -> None:
+    """rosbag2 was killed: the messages are in the write-ahead log beside the file."""
+    path = WRITERS['db3'](tmp_path, camera_messages(FRAMES))
+    database = sqlite3.connect(path)
+    database.execute('PRAGMA journal_mode=WAL')
+    database.execute('PRAGMA wal_autocheckpoint=0')
+    rows = database.execute('SELECT * FROM messages').fetchall()
+    database.execute('DELETE FROM messages')
+    database.commit()
+    database.execute('PRAGMA wal_checkpoint(TRUNCATE)')
+    database.executemany('INSERT INTO messages VALUES (?, ?, ?, ?)', rows)
+    database.commit()
+    killed = tmp_path / 'killed'
+    killed.mkdir()
+    for name in (path.name, path.name + '-wal'):
+        shutil.copy(path.with_name(name), killed / name)
+    database.close()
+    for folder in (killed / path.name, killed):
+        frames, _ = read(folder)
+        assert_same_frames(frames, FRAMES)
 
 
 CUTS = ['mcap', 'mcap lz4', 'mcap zstd', 'ROS 1', 'ROS 1 bz2', 'ROS 1 lz4']

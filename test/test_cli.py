@@ -7,12 +7,16 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import fcntl
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -419,6 +423,27 @@ def test_interrupted_run_leaves_good_files(tmp_path: Path) -> None:
         assert abs(len(recording) - count) <= 1
         assert recording.warnings == []
     assert cv2.VideoCapture(str(out['mp4'])).get(cv2.CAP_PROP_FRAME_COUNT) >= 20
+
+
+def test_progress_is_shown_on_a_terminal_only(folder: Path) -> None:
+    main_end, terminal = os.openpty()
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack('HHHH', 24, 80, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', 'track', str(folder)],
+        stdout=subprocess.PIPE,
+        stderr=terminal,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+    )
+    os.close(terminal)
+    shown = b''
+    with suppress(OSError):  # the terminal is gone with the process
+        while part := os.read(main_end, 4096):
+            shown += part
+    os.close(main_end)
+    out, _ = process.communicate()
+    assert process.returncode == 0
+    assert b'/12 [' in shown
+    assert out.startswith(b'square: 12 frames')
 
 
 def test_closed_pipe_is_no_traceback(folder: Path) -> None:
