@@ -54,8 +54,8 @@ $(BIN)/python:
 	    exit 1; }
 
 # Each stamp is an installation of the checkout itself (editable) with the extras that it names.
-INSTALL = $(BIN)/python -m pip install --disable-pip-version-check
-$(VENV)/.installed: setup.py setup.cfg pyproject.toml | $(BIN)/python
+INSTALL = $(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt
+$(VENV)/.installed: setup.py setup.cfg pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV) ..."
 	$(INSTALL) --editable '.[ros]'
 	@touch $@

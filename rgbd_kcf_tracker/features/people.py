@@ -53,22 +53,28 @@ class PersonFinder:
 
     Args:
         near, far: range in metres in which to look.
-        confirm: ask OpenCV's HOG people detector about each candidate.
+        confirm: ask OpenCV's HOG people detector about each candidate, where OpenCV has it: 5 has
+            moved it into its contributed modules.
         seed: of the search for the floor.
+
+    Attributes:
+        confirms: whether candidates are confirmed.
     """
 
     def __init__(
         self, near: float = 0.5, far: float = 4.5, confirm: bool = True, seed: int = 0
     ) -> None:
-        self._near, self._far, self._confirm = near, far, confirm
+        self._near, self._far = near, far
+        self.confirms = confirm and hasattr(cv2, 'HOGDescriptor')
         self._floor = FloorFinder(seed)
-        self._detector = cv2.HOGDescriptor()
-        self._detector.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
+        if self.confirms:
+            self._detector = cv2.HOGDescriptor()
+            self._detector.setSVMDetector(cv2.HOGDescriptor_getDefaultPeopleDetector())
 
     def nearest(self, frame: Frame) -> Box | None:
         """The nearest person, None where none is found or the frame has no depth."""
         for candidate in self.candidates(frame):
-            if not self._confirm or self.confirmed(frame, candidate.box):
+            if not self.confirms or self.confirmed(frame, candidate.box):
                 return candidate.box
         return None
 

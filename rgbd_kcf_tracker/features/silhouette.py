@@ -184,6 +184,6 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
         ]
         shifted &= ~body
         total = int(np.count_nonzero(shifted))
-        return total > 0 and np.count_nonzero(nearer & shifted) > CUT_SHARE * total
+        return total > 0 and int(np.count_nonzero(nearer & shifted)) > CUT_SHARE * total
 
     return Sides(hidden(0, -RING), hidden(-RING, 0), hidden(0, RING), hidden(RING, 0))

@@ -122,7 +122,8 @@ def linear_correlation(x: Real, z: Real) -> npt.NDArray[np.float64]:
     Shapes as in :func:`gaussian_correlation`.
     """
     cross = _cross(spectrum(x), spectrum(z), (x.shape[-2], x.shape[-1]))
-    return cross / (x.shape[-3] * x.shape[-2] * x.shape[-1])
+    scaled: npt.NDArray[np.float64] = cross / (x.shape[-3] * x.shape[-2] * x.shape[-1])
+    return scaled
 
 
 class Peak(NamedTuple):

@@ -26,6 +26,11 @@ class AutoInit:
         )
         self._looked: int | None = None
 
+    @property
+    def confirms(self) -> bool:
+        """Whether the people detector is asked; not every OpenCV has one."""
+        return self._finder.confirms
+
     def __call__(self, frame: Frame) -> Box | None:
         """The nearest person, if there is one and it is time to look again."""
         if self._looked is not None and 0 <= frame.stamp_ns - self._looked < PERIOD_NS:

@@ -9,6 +9,7 @@ What searches the picture for a target is imported when it is first asked for: m
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import RegionOfInterest
@@ -20,6 +21,9 @@ from rgbd_kcf_tracker.ros.messages import box_from_roi
 from rgbd_kcf_tracker.ros.processor import Processor
 from rgbd_kcf_tracker.ros.session import Choice
 from rgbd_kcf_tracker.ros.settings import RESTART, NodeParameters, parse_box
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.ros.auto_init import AutoInit
 
 
 class Requests:
@@ -73,11 +77,17 @@ class Requests:
                 self._in_worker(lambda: self._session.choose(lambda _: box))
         if any(name.startswith('auto_init') for name in names):
             settings = self._settings()
-            auto: Choice | None = None
+            auto: AutoInit | None = None
             if settings.auto_init:
                 from rgbd_kcf_tracker.ros.auto_init import AutoInit
 
                 auto = AutoInit(settings)
+                if settings.auto_init_confirm and not auto.confirms:
+                    self._fault(
+                        'unconfirmed_auto_init',
+                        'this OpenCV has no HOG people detector (4.x has): auto_init goes by '
+                        'depth alone',
+                    )
             again = settings.auto_init_again
             self._in_worker(lambda: self._session.choose_by_itself(auto, again))
 

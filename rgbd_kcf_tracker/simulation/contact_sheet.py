@@ -74,7 +74,7 @@ def telling_moment(sequence: SimulatedSequence) -> int:
 
 def draw_truth(image: Image, simulated: SimulatedFrame) -> Image:
     """A copy of the image with the true boxes; its size may differ from the frame's."""
-    out = image.copy()
+    out: Image = image.copy()
     scale = image.shape[1] / simulated.frame.width
     for box, color in ((simulated.body, BODY), (simulated.visible, VISIBLE)):
         if box is not None:

@@ -191,7 +191,7 @@ def render(
     x = ((np.arange(x0, x1) - camera.cx) / camera.fx).astype(np.float32)
     y = ((np.arange(y0, y1) - camera.cy) / camera.fy).astype(np.float32)[:, None]
 
-    inverse = np.linalg.inv(solids.frame)
+    inverse = np.asarray(np.linalg.inv(solids.frame), np.float64)
     b = -np.einsum('nij,nj->ni', inverse, solids.origin)
     k = solids.taper
     sign = np.ones((len(k), 3))
