@@ -37,6 +37,9 @@ _SETTLING_S = 0.3
 _BODY = 0.5
 # Share of the patch that must be left of a target for its motion to be read from it.
 _OWN_SHARE = 0.2
+# Share of a patch that must have a reading to be remembered: the few readings about a target that
+# swallows the infrared are the background's.
+_LEAST_SEEN = 0.3
 # Quantile of the depths in a first box that is taken for the target's.
 _NEARER_PART = 0.3
 
@@ -119,7 +122,7 @@ class DepthPatch:
             interval: seconds since the frame before; None where the target was not seen in it.
         """
         seen = patch[np.isfinite(patch)]
-        if len(seen) < self._least_valid * patch.size:
+        if len(seen) < _LEAST_SEEN * patch.size:
             return
         depth = self._depth
         if depth is None or np.mean(np.abs(seen - depth) <= _BODY) < _OWN_SHARE:

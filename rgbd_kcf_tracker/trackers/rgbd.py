@@ -94,10 +94,10 @@ class RgbdTracker(DepthAwareTracker):
             not self._hidden or self._plausible(frame, best)
         ):
             return self._detected(frame, model, best, interval)
-        # Hidden, the target is where it was left: only what is there tells that it is free again.
-        places = (here,) if self._hidden or best == here else (best, here)
         reach = 0.0 if self._hidden else interval
-        for found in places:
+        for found, least in ((best, (self._low + self._high) / 2), (here, self._low)):
+            if self._hidden and found.response < least:
+                continue
             difference = self._diff_at_centre(frame, self._box_at(found), reach)
             if not self._occlusion_status(difference, found.response):
                 return self._partly_visible(frame, model, found, difference, interval)
