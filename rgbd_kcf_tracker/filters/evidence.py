@@ -31,7 +31,6 @@ class Evidence:
         kin: how well it fits a thing that was seen beside the target, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
         height: squared-error term of its height, at most 0; 0 where it fits or is cut off.
-        width: the same of its width.
         hidden: seconds since the target was last seen; 0 while it is followed.
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
@@ -45,7 +44,6 @@ class Evidence:
     kin: float
     fraction: float
     height: float
-    width: float
     hidden: float
     missing: bool
     inland: float
@@ -63,13 +61,11 @@ class Evidence:
                 np.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
                 pale,
-                pale**2,
                 self.known,
                 self.kin,
                 more**2,
                 less,
                 max(self.height, -8.0),
-                max(self.width, -8.0),
                 away,
                 np.log1p(self.hidden),
                 away * pale,
@@ -85,8 +81,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.827, -1.471, -0.102, -10.785, 10.480, -1.218, -2.671, -2.637, -3.674, 0.639, -0.002,
-        -0.704, -1.254, 0.907, -2.326, 0.776, 1.143, -0.465, -2.991, 6.782,
+        -0.823, -1.552, -0.103, -6.341, -1.444, -2.268, -2.593, -3.686, 0.646,
+        -0.854, -1.211, 1.586, -2.108, 0.605, 1.153, -0.366, -3.094, 6.648,
     )
 )  # fmt: skip
 

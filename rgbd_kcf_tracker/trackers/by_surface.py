@@ -234,9 +234,6 @@ class BySurface:
             height=_misfit(
                 seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
             ),
-            width=_misfit(
-                seen.width, body.width, seen.cut.left or seen.cut.right, body.width_known
-            ),
             hidden=self.hidden_for,
             missing=missing,
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
@@ -270,7 +267,9 @@ class BySurface:
         if self.motion.position[2] < 0.3:
             return np.zeros((0, 0), np.float32), 1.0
         left, top, right, bottom = self._outline(scene.view)
-        return scene.view.depth[self._outline_slices(scene.view)], max(1.0, (right - left + 1) * (bottom - top + 1))
+        return scene.view.depth[self._outline_slices(scene.view)], max(
+            1.0, (right - left + 1) * (bottom - top + 1)
+        )
 
     def _should_be_seen(self, scene: Scene) -> float:
         """Share of the expected body that nothing nearer, no hole and no image edge hides."""

@@ -49,7 +49,7 @@ class MetricParameters(Parameters):
         maximum=20.0,
     )
     acceptance: float = parameter(
-        0.5,
+        0.45,
         'Probability from which a candidate is taken for the target.',
         minimum=0.01,
         maximum=0.99,

@@ -1,0 +1,334 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The metric tracker as a whole: on simulated scenes, on recordings, and on what no scene is."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
+from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.simulation import simulate
+from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
+from rgbd_kcf_tracker.trackers.track import Track
+
+SIZE = (480, 270)
+XTION = Intrinsics(534.29, 534.75, 309.57, 243.07)
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """A tracker's answers to a scene, first frame left out, and what was true."""
+
+    tracks: list[Track]
+    visible: list[Box | None]
+    body: list[Box | None]
+    fraction: list[float]
+
+    @property
+    def overlaps(self) -> list[float]:
+        """IoU with what shows or with the whole body, the better, where there is a box."""
+        return [
+            max(t.box.iou(v), t.box.iou(b) if b else 0.0) if t.box and v else 0.0
+            for t, v, b in zip(self.tracks, self.visible, self.body, strict=True)
+        ]
+
+    @property
+    def success(self) -> float:
+        """Princeton's success at 0.5."""
+        good = [
+            t.box is None if v is None else o > 0.5
+            for t, v, o in zip(self.tracks, self.visible, self.overlaps, strict=True)
+        ]
+        return float(np.mean(good))
+
+
+def follow(
+    scenario: str,
+    seed: int,
+    rate: float,
+    change=lambda frame: frame,
+    parameters: MetricParameters | None = None,
+) -> Run:
+    tracker = create_tracker('metric', parameters)
+    run = Run([], [], [], [])
+    for i, sample in enumerate(simulate(scenario, seed=seed, rate_hz=rate, size=SIZE)):
+        frame = change(sample.frame)
+        if i == 0:
+            tracker.start(frame, sample.visible)
+            continue
+        run.tracks.append(tracker.update(frame))
+        run.visible.append(sample.visible)
+        run.body.append(sample.body)
+        run.fraction.append(sample.visible_fraction)
+    return run
+
+
+# -- the contract ---------------------------------------------------------------------------------
+
+
+def picture(seed: int = 0, size: tuple[int, int] = (240, 320)) -> Frame:
+    rng = np.random.default_rng(seed)
+    color = rng.integers(0, 256, (*size, 3), dtype=np.uint8)
+    depth = np.full(size, 3.0, np.float32)
+    depth[60:200, 120:180] = 1.5
+    return Frame(color, depth, seed * 33_000_000, Intrinsics(300, 300, 160, 120))
+
+
+def test_idle_before_start():
+    assert create_tracker('metric').update(picture()).state is TrackState.IDLE
+
+
+def test_refuses_a_box_outside():
+    with pytest.raises(BoxError, match='outside'):
+        create_tracker('metric').start(picture(), Box(400, 10, 20, 20))
+
+
+def test_parameters_are_checked():
+    with pytest.raises(ParameterError, match='acceptance'):
+        MetricParameters(acceptance=1.5)
+    with pytest.raises(ParameterError, match='view_width'):
+        MetricParameters(view_width=1)
+
+
+def test_the_first_track_is_the_given_box():
+    box = Box(120, 60, 60, 140)
+    track = create_tracker('metric').start(picture(), box)
+    assert track.box == box
+    assert track.state is TrackState.TRACKING
+    assert track.depth == pytest.approx(1.5, abs=0.01)
+    assert track.position is not None
+    assert track.position[2] == pytest.approx(1.5, abs=0.01)
+
+
+def test_same_input_same_output():
+    first, second = (follow('occlusion', 4, 10.0) for _ in range(2))
+    assert first.tracks == second.tracks
+
+
+@pytest.mark.parametrize(
+    'box', [Box(0, 0, 320, 240), Box(-50, -50, 80, 80), Box(310, 230, 30, 30), Box(5, 5, 1.5, 1.5)]
+)
+def test_never_raises_on_odd_boxes(box: Box):
+    tracker = create_tracker('metric')
+    tracker.start(picture(), box)
+    for i in range(1, 4):
+        tracker.update(picture(i))
+
+
+def odd_frames() -> list[Frame]:
+    base = picture(1)
+    nan = np.full((240, 320), np.nan, np.float32)
+    noise = np.random.default_rng(3).uniform(0.1, 9.0, (240, 320)).astype(np.float32)
+    k = base.intrinsics
+    stamps = iter(range(2, 100))
+    return [
+        Frame(base.color, depth, next(stamps) * 33_000_000, camera)
+        for camera in (k, None)
+        for depth in (
+            None,
+            nan,
+            np.zeros_like(nan),
+            np.full_like(nan, np.inf),
+            np.full_like(nan, 1e-6),
+            np.full_like(nan, -1.0),
+            noise,
+        )
+    ] + [Frame(np.zeros((240, 320, 3), np.uint8), nan, 40 * 33_000_000, k)]
+
+
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_never_raises_on_odd_depth():
+    for first in [picture(), *odd_frames()]:
+        tracker = create_tracker('metric')
+        tracker.start(first, Box(120, 60, 60, 140))
+        for frame in [*odd_frames(), picture(50)]:
+            track = tracker.update(frame)
+            assert (track.box is None) == (track.state is not TrackState.TRACKING)
+            assert 0 <= track.score <= 1
+
+
+def test_goes_on_when_the_image_size_changes():
+    tracker = create_tracker('metric')
+    tracker.start(picture(), Box(120, 60, 60, 140))
+    for i, size in enumerate([(240, 320), (480, 640), (120, 160), (240, 320)], start=1):
+        tracker.update(picture(i, size) if size[0] >= 240 else _small(i))
+
+
+def _small(index: int) -> Frame:
+    color = np.zeros((120, 160, 3), np.uint8)
+    return Frame(color, np.full((120, 160), 2.0, np.float32), index * 33_000_000, None)
+
+
+def test_stamps_may_stand_still_or_jump_back():
+    tracker = create_tracker('metric')
+    frame = picture()
+    tracker.start(frame, Box(120, 60, 60, 140))
+    for stamp in (0, 0, -5_000_000_000, 10**18, 10**18 + 33_000_000):
+        track = tracker.update(dataclasses.replace(frame, stamp_ns=stamp))
+        assert track.box is not None
+
+
+# -- what it is for -------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('scenario', ['occlusion', 'passer_by', 'early_occlusion', 'behind_box'])
+def test_says_truthfully_when_hidden_and_finds_again(scenario: str):
+    run = follow(scenario, 5, 30.0)
+    assert run.success > 0.85
+    # No box within two frames of 80 % hidden, for as long as it is hidden.
+    hidden = np.array(run.fraction) < 0.2
+    since = 0
+    for is_hidden, track in zip(hidden, run.tracks, strict=True):
+        since = since + 1 if is_hidden else 0
+        if since > 2:
+            assert track.box is None
+    assert hidden.any()
+    assert run.tracks[-1].box is not None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('rate', [5.0, 10.0])
+def test_low_frame_rates(rate: float):
+    scores = [follow(name, 3, rate).success for name in ('normal', 'motion', 'occlusion')]
+    assert np.mean(scores) > 0.85
+
+
+@pytest.mark.slow
+def test_irregular_stamps_and_gaps():
+    rng = np.random.default_rng(0)
+    kept = iter(rng.random(1000) < 0.5)
+    tracker = create_tracker('metric')
+    good = []
+    for i, sample in enumerate(simulate('normal', seed=2, rate_hz=30.0, size=SIZE)):
+        if i == 0:
+            tracker.start(sample.frame, sample.visible)
+        elif next(kept) and not 40 < i < 50:
+            track = tracker.update(sample.frame)
+            good.append(track.box is not None and track.box.iou(sample.visible) > 0.5)
+    assert np.mean(good) > 0.9
+
+
+@pytest.mark.slow
+def test_no_worse_without_depth_than_a_colour_tracker():
+    def colour(frame: Frame) -> Frame:
+        return Frame(frame.color, None, frame.stamp_ns, frame.intrinsics)
+
+    ours = np.mean([follow(name, 3, 15.0, colour).success for name in ('normal', 'occlusion')])
+    assert ours > 0.8
+
+
+@pytest.mark.slow
+def test_works_without_intrinsics_and_gives_no_position():
+    def unknown(frame: Frame) -> Frame:
+        return Frame(frame.color, frame.depth, frame.stamp_ns, None)
+
+    run = follow('normal', 3, 10.0, unknown)
+    assert run.success > 0.9
+    assert all(t.position is None for t in run.tracks)
+    assert any(t.depth is not None for t in run.tracks)
+
+
+@pytest.mark.slow
+def test_depth_that_comes_and_goes():
+    def flicker(frame: Frame) -> Frame:
+        dark = frame.stamp_ns // 500_000_000 % 2 == 1
+        return Frame(frame.color, None if dark else frame.depth, frame.stamp_ns, frame.intrinsics)
+
+    assert follow('normal', 3, 15.0, flicker).success > 0.8
+
+
+@pytest.mark.slow
+def test_position_is_where_the_target_is():
+    errors = []
+    tracker = create_tracker('metric')
+    for i, sample in enumerate(simulate('approach', seed=2, rate_hz=10.0, size=SIZE)):
+        if i == 0:
+            tracker.start(sample.frame, sample.visible)
+            continue
+        track = tracker.update(sample.frame)
+        if track.position is not None and sample.visible is not None:
+            b = sample.visible.scaled(0.3)
+            depth = sample.frame.depth[int(b.y) : int(b.bottom) + 1, int(b.x) : int(b.right) + 1]
+            errors.append(abs(track.position[2] - np.nanmedian(depth)))
+    assert np.median(errors) < 0.15
+
+
+# -- recordings -----------------------------------------------------------------------------------
+
+
+def boxes_of(path: Path) -> list[Box | None]:
+    rows = np.genfromtxt(path, delimiter=',')
+    return [Box(*row) if np.isfinite(row[0]) else None for row in rows]
+
+
+def frames_of(folder: Path, fps: float, camera: Intrinsics | None, depth: bool) -> list[Frame]:
+    frames = []
+    for i, path in enumerate(sorted((folder / 'rgb').iterdir())):
+        metres = None
+        if depth:
+            metres = cv2.imread(str(folder / 'depth' / f'{path.stem}.png'), -1).astype(np.float32)
+            metres /= 1000
+            metres[metres == 0] = np.nan
+        frames.append(Frame(cv2.imread(str(path)), metres, round(i * 1e9 / fps), camera))
+    return frames
+
+
+def answers(frames: list[Frame], truth: list[Box | None], first: int, end: int) -> Iterable:
+    tracker = create_tracker('metric')
+    box = truth[first]
+    assert box is not None
+    tracker.start(frames[first], box)
+    return [(tracker.update(frames[i]).box, truth[i]) for i in range(first + 1, end)]
+
+
+@pytest.mark.slow
+def test_real_people_at_5_hz(shared_data: Path):
+    folder = shared_data / 'rgbd' / 'filinha'
+    frames = frames_of(folder, 5.0, XTION, depth=True)
+    success, overlap = [], []
+    for path in sorted(folder.glob('groundtruth_*.txt')):
+        truth = boxes_of(path)
+        shown = np.genfromtxt(str(path).replace('groundtruth_', 'visible_'), delimiter=',')[:, 0]
+        present = [i for i, box in enumerate(truth) if box is not None]
+        first = next(i for i in present if shown[i] >= 0.6)
+        pairs = answers(frames, truth, first, min(len(truth), present[-1] + 16))
+        ious = [b.iou(t) if b and t else 0.0 for b, t in pairs]
+        good = [b is None if t is None else i > 0.5 for (b, t), i in zip(pairs, ious, strict=True)]
+        success.append(np.mean(good))
+        overlap.append(np.mean([i for i, (_, t) in zip(ious, pairs, strict=True) if t]))
+    assert np.mean(success) >= 0.75
+    assert np.mean(overlap) >= 0.65
+
+
+@pytest.mark.slow
+def test_the_mug_is_found_again_each_time(shared_data: Path):
+    folder = shared_data / 'rgbd' / 'redkitchen'
+    truth = boxes_of(folder / 'groundtruth.txt')
+    frames = frames_of(folder, 30.0, Intrinsics(526.5, 526.5, 324, 238), depth=True)
+    pairs = answers(frames, truth, 0, len(truth))
+    away = [i for i, (_, t) in enumerate(pairs) if t is None]
+    after = [(b, t) for b, t in pairs[away[0] :] if t is not None]
+    assert len(after) > 50
+    assert np.mean([b is not None and b.iou(t) > 0.3 for b, t in after]) > 0.9
+
+
+@pytest.mark.slow
+def test_colour_only_as_good_as_the_best_colour_trackers(shared_data: Path):
+    precision = []
+    for name in ('Couple', 'Crossing', 'Football1'):
+        folder = shared_data / 'otb' / name
+        truth = [b.moved(-1, -1) for b in boxes_of(folder / 'groundtruth.txt') if b is not None]
+        frames = frames_of(folder, 30.0, None, depth=False)
+        pairs = answers(frames, truth, 0, len(truth))
+        near = [b is not None and np.hypot(b.cx - t.cx, b.cy - t.cy) <= 20 for b, t in pairs]
+        precision.append(np.mean(near))
+    assert np.mean(precision) >= 0.8

@@ -1,0 +1,356 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The parts of the metric tracker, each against what it should do exactly."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import cv2
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker import Box, Frame, Intrinsics
+from rgbd_kcf_tracker.features.color_bands import (
+    BANDS,
+    CODES,
+    band_histograms,
+    band_similarity,
+    color_codes,
+)
+from rgbd_kcf_tracker.features.depth_view import DepthView
+from rgbd_kcf_tracker.features.floor import FloorFinder
+from rgbd_kcf_tracker.features.patch import PatchFeatures, resampled
+from rgbd_kcf_tracker.features.scene import SceneReader
+from rgbd_kcf_tracker.features.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.features.surfaces import cut
+from rgbd_kcf_tracker.filters.body import Body
+from rgbd_kcf_tracker.filters.bystanders import Bystanders
+from rgbd_kcf_tracker.filters.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.filters.evidence import WEIGHTS, Evidence, probability
+from rgbd_kcf_tracker.filters.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.filters.masked_filter import MaskedFilter
+from rgbd_kcf_tracker.filters.motion import MotionFilter
+from rgbd_kcf_tracker.filters.scale_filter import ScaleFilter
+
+CAMERA = Intrinsics(200, 200, 120, 80)
+
+
+def view_of(depth: np.ndarray) -> DepthView:
+    return DepthView(depth.astype(np.float32), 1, CAMERA)
+
+
+def wall(z: float = 4.0) -> np.ndarray:
+    return np.full((160, 240), z, np.float32)
+
+
+def blobs(seed: int, size: int = 200) -> np.ndarray:
+    noise = np.random.default_rng(seed).integers(0, 256, (size, size, 3), dtype=np.uint8)
+    return cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 4), None, 0, 255, cv2.NORM_MINMAX)
+
+
+# -- depth and surfaces ---------------------------------------------------------------------------
+
+
+def test_view_takes_every_step_and_fills_single_holes():
+    depth = np.full((480, 640), 2.0, np.float32)
+    depth[4::8, 4::8] = np.nan
+    color = np.zeros((480, 640, 3), np.uint8)
+    view = DepthView.of(Frame(color, depth, 0, Intrinsics(525, 525, 320, 240)), 80)
+    assert view.step == 8
+    assert view.shape == (60, 80)
+    assert (view.depth == 2.0).all()
+    assert view.intrinsics.fx == pytest.approx(525 / 8)
+
+
+def test_holes_are_zero_and_no_depth_is_no_view():
+    color = np.zeros((48, 64, 3), np.uint8)
+    view = DepthView.of(Frame(color, np.full((48, 64), np.nan, np.float32)), 64)
+    assert not view.depth.any()
+    assert DepthView.of(Frame(color), 64) is None
+
+
+def floor_scene(height: float = 1.2) -> np.ndarray:
+    rows = np.arange(160, dtype=np.float64)[:, None]
+    down = (rows - CAMERA.cy) / CAMERA.fy
+    z = np.where(down > 1e-6, height / np.maximum(down, 1e-6), 1e9)
+    return np.minimum(np.broadcast_to(z, (160, 240)), 5.0).astype(np.float32)
+
+
+def test_floor_is_found_and_what_stands_on_it_is_above():
+    depth = floor_scene()
+    depth[40:150, 100:130] = 2.0
+    floor = FloorFinder(0).update(view_of(depth))
+    assert floor is not None
+    assert floor.height == pytest.approx(1.2, abs=0.04)
+    elevation = floor.elevation(depth)
+    assert np.abs(elevation[150:, 10:60]).max() < 0.02
+    # A point 30 rows below the middle at 2 m is 0.3 m below the camera.
+    assert elevation[110, 110] == pytest.approx(0.9, abs=0.06)
+    assert floor.row_at(110, 2.0) == pytest.approx(80 + 200 * 1.2 / 2.0, abs=2)
+
+
+def test_a_wall_is_no_floor():
+    assert FloorFinder(0).update(view_of(wall(2.0))) is None
+
+
+def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():
+    depth = wall()
+    depth[30:120, 60:100] = 2.0
+    depth[30:120, 150:200] = np.linspace(2, 3, 50)
+    surfaces = cut(depth, depth > 0, 0.04, 0.03)
+    front, slope, back = (surfaces.labels[r, c] for r, c in ((60, 80), (60, 170), (5, 5)))
+    assert len({front, slope, back}) == 3
+    assert surfaces.pixels[front] == 90 * 40
+    assert surfaces.depth[front] == pytest.approx(2.0)
+    assert tuple(surfaces.boxes[front]) == (60, 30, 40, 90)
+
+
+def test_silhouette_knows_what_cuts_it_off():
+    depth = wall()
+    depth[40:120, 80:110] = 2.5
+    depth[100:160, 60:130] = 1.5
+    mask = depth[40:100, 80:110] == 2.5
+    seen = Silhouette.of(view_of(depth), 80, 40, mask, 1, Rim())
+    assert dataclasses.astuple(seen.cut) == (False, False, False, True)
+    assert seen.depth == pytest.approx(2.5)
+    assert seen.width == pytest.approx(30 * 2.5 / 200)
+    assert seen.area == pytest.approx(30 * 60 * 2.5**2 / 200**2)
+
+
+def test_silhouette_is_cut_by_the_image_and_by_the_rim():
+    depth = wall()
+    mask = np.ones((50, 20), bool)
+    assert Silhouette.of(view_of(depth), 0, 40, mask, 1, Rim()).cut.left
+    assert not Silhouette.of(view_of(depth), 30, 40, mask, 1, Rim()).cut.any
+    assert Silhouette.of(view_of(depth), 30, 40, mask, 1, Rim(left=29)).cut.left
+    depth[:, :29] = 0
+    assert Rim.of(view_of(depth)) == Rim(left=29)
+
+
+# -- colour ---------------------------------------------------------------------------------------
+
+
+def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
+    color = np.zeros((80, 40, 3), np.uint8)
+    color[:40] = (200, 30, 30)
+    color[40:] = (30, 30, 200)
+    codes, _ = color_codes(color, 1, (80, 40))
+    mask = np.ones((80, 40), bool)
+    counts = band_histograms(codes, mask, 0, 80)
+    assert counts.shape == (BANDS, CODES)
+    assert counts.sum() == pytest.approx(80 * 40)
+    model = counts / counts.sum(axis=1, keepdims=True)
+    assert band_similarity(counts, model) == pytest.approx(1.0, abs=1e-5)
+    upside_down = band_histograms(codes[::-1].copy(), mask, 0, 80)
+    assert band_similarity(upside_down, model) < 0.1
+    # The lower half alone is like the lower half of the body, not like the whole.
+    lower = band_histograms(codes[40:], mask[40:], -40, 80)
+    assert band_similarity(lower, model) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_posterior_is_bayes_with_even_odds():
+    posterior = ColorPosterior()
+    codes = np.array([[1, 1, 1, 2], [2, 2, 2, 1]])
+    target = np.array([[True] * 4, [False] * 4])
+    posterior.learn(codes, target, ~target, 1.0)
+    assert posterior.of(np.array([1, 2, 7])) == pytest.approx([0.75, 0.25, 0.5], abs=1e-3)
+
+
+# -- motion ---------------------------------------------------------------------------------------
+
+
+def test_motion_filter_is_the_textbook_kalman_filter():
+    rng = np.random.default_rng(0)
+    sigma, noise = 0.1, 2.0
+    ours = MotionFilter(np.zeros(3), 0.5, 1.0, np.full(3, noise))
+    x, p = np.zeros(2), np.diag([0.25, 1.0])
+    h = np.array([[1.0, 0.0]])
+    for _ in range(20):
+        dt, z = rng.uniform(0.01, 0.3), rng.normal()
+        f = np.array([[1, dt], [0, 1]])
+        q = noise**2 * np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])
+        x, p = f @ x, f @ p @ f.T + q
+        ours.predict(dt)
+        gain = p @ h.T / (h @ p @ h.T + sigma**2)
+        x, p = x + gain[:, 0] * (z - x[0]), (np.eye(2) - gain @ h) @ p
+        ours.correct(np.array([z, 0, 0]), np.full(3, sigma))
+        assert ours.position[0] == pytest.approx(x[0])
+        assert ours.velocity[0] == pytest.approx(x[1])
+        assert ours.sigma[0] == pytest.approx(np.sqrt(p[0, 0]))
+        assert ours.speed_sigma[0] == pytest.approx(np.sqrt(p[1, 1]))
+
+
+def cloud(count: int = 500) -> HiddenCloud:
+    rng = np.random.default_rng(1)
+    still = np.zeros(3)
+    return HiddenCloud(np.array([0, -0.5, 2.5]), still, np.full(3, 0.2), still + 0.1, count, rng)
+
+
+def test_particles_die_where_the_camera_sees_past_them():
+    depth = wall(5.0)
+    depth[:, 120:] = 1.5  # a board over the right half: what is left of the target is behind it
+    hidden = cloud()
+    for _ in range(30):
+        hidden.step(1 / 30, view_of(depth), 0.5)
+    assert hidden.mean[0] > 0.1
+    left = hidden.distance(np.array([-0.3, -0.5, 2.5]), np.full(3, 0.05))
+    right = hidden.distance(np.array([0.3, -0.5, 2.5]), np.full(3, 0.05))
+    assert left > right + 1.0
+
+
+def test_particles_spread_with_time_not_with_frames():
+    depth = wall(1.0)
+    spreads = []
+    for rate in (5, 30):
+        hidden = cloud(4000)
+        for _ in range(rate):
+            hidden.step(1 / rate, view_of(depth), 0.5)
+        spreads.append(hidden.spread[0])
+    assert spreads[0] == pytest.approx(spreads[1], rel=0.2)
+
+
+# -- the body -------------------------------------------------------------------------------------
+
+
+def placed(cut_bottom: bool) -> tuple[Body, np.ndarray]:
+    depth = wall()
+    depth[40:120, 100:130] = 2.0
+    codes = np.zeros((160, 240), np.int32)
+    view = view_of(depth)
+    body = Body(Silhouette.of(view, 100, 40, depth[40:120, 100:130] == 2.0, 1, Rim()))
+    bottom = 120
+    if cut_bottom:
+        depth[80:, 60:180] = 1.0
+        bottom = 80
+    seen = Silhouette.of(view_of(depth), 100, 40, depth[40:bottom, 100:130] == 2.0, 1, Rim())
+    here = np.array([-0.05, -0.4, 2.0])
+    result = body.place(seen, codes, view_of(depth), here, np.full(3, 0.1))
+    return body, np.array([*result.position, result.fraction])
+
+
+def test_body_is_placed_by_the_sides_that_show():
+    body, whole = placed(cut_bottom=False)
+    assert body.height == pytest.approx(0.8)
+    assert whole == pytest.approx([-0.05, -0.4, 2.0, 1.0], abs=1e-6)
+    _, half = placed(cut_bottom=True)
+    assert half[:3] == pytest.approx(whole[:3], abs=1e-6)
+    assert half[3] == pytest.approx(0.5)
+
+
+def test_body_does_not_grow_into_its_neighbour():
+    depth = wall()
+    depth[40:120, 100:130] = 2.0
+    first = Silhouette.of(view_of(depth), 100, 40, depth[40:120, 100:130] == 2.0, 1, Rim())
+    body = Body(first)
+    depth[40:120, 100:220] = 2.0
+    merged = Silhouette.of(view_of(depth), 100, 40, depth[40:120, 100:220] == 2.0, 1, Rim())
+    for _ in range(30):
+        body.learn_size(merged, 1 / 30)
+    assert body.area < 2 * first.area
+
+
+def lookalikes(left: int, right: int) -> Frame:
+    depth = np.full((270, 480), 4.0, np.float32)
+    color = np.full((270, 480, 3), 90, np.uint8)
+    for x in (left, right):
+        depth[80:250, x : x + 60] = 2.0
+        color[80:250, x : x + 60] = (40, 40, 180)
+    return Frame(color, depth, 0, Intrinsics(270, 270, 240, 135))
+
+
+def test_a_lookalike_seen_beside_the_target_stays_known():
+    reader = SceneReader(240, 0.04, 0.03, 0.0, 0)
+    bystanders = Bystanders()
+    scene = reader.read(lookalikes(100, 300))
+    bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
+    target = scene.silhouette(int(scene.surfaces.labels[80, 65]))
+    other = scene.silhouette(int(scene.surfaces.labels[80, 165]))
+    none = np.zeros(len(scene.surfaces), bool)
+    around = (target.rows, target.cols)
+    bystanders.remember(scene.view, scene.surfaces, target, around, none, 0.01)
+    # At 30 Hz the pixels tell, at 5 Hz the things do.
+    for step, dt in ((4, 1 / 30), (40, 0.2)):
+        scene = reader.read(lookalikes(100, 300 + step))
+        bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
+        target = scene.silhouette(int(scene.surfaces.labels[80, 65]))
+        other = scene.silhouette(int(scene.surfaces.labels[80, (310 + step) // 2]))
+        assert max(bystanders.of(other, scene.surfaces)) > 0.5
+        assert bystanders.of(target, scene.surfaces)[0] < 0.1
+
+
+# -- the look -------------------------------------------------------------------------------------
+
+
+def test_masked_filter_answers_with_the_shift():
+    features = PatchFeatures(32)
+    image = blobs(1, 400)
+    learned = MaskedFilter(32, 1.2, 3)
+    mask = np.zeros((32, 32), np.float32)
+    mask[10:22, 12:20] = 1
+    learned.learn(features(resampled(image, 200, 200, 128, 128)), mask, 1.0)
+    for dx, dy in ((0, 0), (8, -4), (-12, 20)):
+        response = learned.response(features(resampled(image, 200 + dx, 200 + dy, 128, 128)))
+        row, col = np.unravel_index(int(np.argmax(response)), response.shape)
+        found = ((col + 16) % 32 - 16) * 4, ((row + 16) % 32 - 16) * 4
+        assert found == (-dx, -dy)
+
+
+@pytest.mark.parametrize('factor', [0.96, 1.0, 1.05])
+def test_scale_filter_finds_the_factor(factor: float):
+    image = blobs(2, 300)
+    scales = ScaleFilter(60, 90)
+    scales.learn(image, 150, 150, 60, 90, 1.0)
+    larger = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR)
+    found = scales.factor(larger, 150 * factor, 150 * factor, 60, 90)
+    assert found == pytest.approx(factor, rel=0.03)
+
+
+def test_windows_reach_outside_the_image_and_shrink_large_ones():
+    image = blobs(3, 200)
+    for cx, cy, side in ((0, 0, 64), (500, -300, 64), (100, 100, 900), (100, 100, 10)):
+        assert resampled(image, cx, cy, side, 96).shape == (96, 96, 3)
+    whole = resampled(image, 100, 100, 100, 100)
+    assert np.abs(whole.astype(int) - image[50:150, 50:150]).max() <= 1
+    assert rgb_codes(whole).max() < 4096
+
+
+# -- the verdict ----------------------------------------------------------------------------------
+
+
+GOOD = Evidence(
+    step=0.5,
+    stride=0.1,
+    pale=0.0,
+    known=0.0,
+    kin=0.0,
+    fraction=1.0,
+    height=0.0,
+    hidden=0.0,
+    missing=False,
+    inland=0.0,
+)
+
+
+def test_evidence_speaks_for_what_fits_and_against_what_does_not():
+    assert len(GOOD.features()) == len(WEIGHTS)
+    assert probability(GOOD) > 0.95
+    for worse in (
+        {'step': 40.0, 'stride': 6.0},
+        {'pale': 0.5, 'step': 12.0, 'stride': 2.0},
+        {'known': 1.0, 'kin': 1.0, 'hidden': 0.5},
+        {'fraction': 0.08},
+        {'height': -8.0, 'pale': 0.1},
+    ):
+        assert probability(dataclasses.replace(GOOD, **worse)) < 0.5, worse
+
+
+def test_surface_of_a_box_is_the_one_it_is_drawn_about():
+    from rgbd_kcf_tracker.trackers.by_surface import BySurface
+
+    scene = SceneReader(240, 0.04, 0.03, 0.0, 0).read(lookalikes(100, 300))
+    seen = BySurface.surface_of(scene, Box(100, 80, 60, 170))
+    assert seen is not None
+    assert BySurface.outline(scene, seen).iou(Box(100, 80, 60, 170)) > 0.9
+    assert BySurface.surface_of(scene, Box(10, 10, 20, 20)) is None
