@@ -77,7 +77,7 @@ def overview(measured: Measured) -> Table:
     headings = [c.heading for c in OVERVIEW]
     return Table(
         'overview',
-        f'All measures, mean over {len(measured.sequences)} sequences',
+        f'All measures, mean over {number(measured)}',
         ('tracker', headings[0], '95 % interval', *headings[1:], 'median ms', 'p95 ms'),
         tuple(rows),
         note='The interval is of the mean over sequences (bootstrap). Times are of one update on '
@@ -151,7 +151,7 @@ def ablation(measured: Measured, base: str) -> Table:
     )  # fmt: skip
     return Table(
         f'ablation_{base}',
-        f'What {base} loses without each ingredient, mean over {len(measured.sequences)} sequences',
+        f'What {base} loses without each ingredient, mean over {number(measured)}',
         ('tracker', *headings),
         tuple(rows),
         note='Each row switches one parameter use_... off; changes are in percentage points.',
@@ -246,6 +246,12 @@ def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> 
     means = rng.choice(known, (2000, len(known))).mean(axis=1)
     low, high = np.percentile(means, [2.5, 97.5])
     return float(low), float(high)
+
+
+def number(measured: Measured) -> str:
+    """How many sequences, in words."""
+    count = len(measured.sequences)
+    return f'{count} sequence{"" if count == 1 else "s"}'
 
 
 def scaled(value: float, scale: float) -> float | None:
