@@ -180,6 +180,7 @@ class ReplayNode(Node):
         started = time.monotonic()
         while player.play(source.messages(parameters.start), stop) and parameters.loop:
             pass
+        seconds = time.monotonic() - started
         if not stop.is_set():
             # The last images may still be on their way, and their answers too.
             for publisher in self._publishers_by_topic.values():
@@ -188,7 +189,7 @@ class ReplayNode(Node):
             if self._answers is not None and self.count_publishers(parameters.answer_topic):
                 answers.wait(1.0, stop)
         answers.give_up()
-        figures = figures_of(player, answers, time.monotonic() - started)
+        figures = figures_of(player, answers, seconds)
         self.get_logger().info(summary(figures))
         if parameters.report:
             write_report(Path(parameters.report), figures)
