@@ -341,7 +341,7 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
         {'pale': 0.5, 'step': 12.0, 'stride': 2.0},
         {'known': 1.0, 'kin': 1.0, 'hidden': 0.5},
         {'fraction': 0.08},
-        {'height': -8.0, 'pale': 0.1},
+        {'height': -8.0, 'pale': 0.3},
     ):
         assert probability(dataclasses.replace(GOOD, **worse)) < 0.5, worse
 

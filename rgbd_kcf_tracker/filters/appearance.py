@@ -155,7 +155,7 @@ class Appearance:
         self.mean_peak += (1 - np.exp(-dt / MEAN_TIME)) * (peak - self.mean_peak)
 
     def learn(self, color: Image, cx: float, cy: float, scale: float, dt: float | None) -> None:
-        """Take the target at ``cx, cy`` as a sample, ``dt`` seconds after the last (None: first)."""
+        """Take the target at ``cx, cy`` as a sample, ``dt`` seconds after the last (None: none)."""
         if dt is None:
             rate = color_rate = 1.0
         else:
