@@ -63,6 +63,7 @@ class Camera:
     """Publishers of a colour, a depth and a camera_info topic, and what they send."""
 
     def __init__(self, size: str, frames: int, compressed: bool) -> None:
+        from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import PolygonStamped
         from rclpy.node import Node
         from rclpy.qos import QoSProfile
@@ -76,23 +77,31 @@ class Camera:
         self._depth = self.node.create_publisher(kind, f'depth/image{depth}', qos)
         self._info = self.node.create_publisher(CameraInfo, 'color/camera_info', qos)
         self._answers = 0
+        self._known = False
         self.node.create_subscription(
             PolygonStamped, 'tracker/box', self._answered, QoSProfile(depth=100)
         )
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._heard, 10)
         messages = _messages(SIZES[size], frames)
         self._messages = [_packed(m) for m in messages] if compressed else list(messages)
 
     def _answered(self, _: Any) -> None:
         self._answers += 1
 
+    def _heard(self, message: Any) -> None:
+        """The tracker knows this node: its answers will come here."""
+        self._known |= any(status.name.startswith(NAMESPACE) for status in message.status)
+
     def await_listener(self, timeout_s: float) -> bool:
-        """Until the tracker listens to all three topics."""
+        """Until the tracker listens to all three topics and its answers come here."""
+        import rclpy
+
         end = time.monotonic() + timeout_s
         topics = (self._color, self._depth, self._info)
-        while not all(p.get_subscription_count() for p in topics):
+        while not (self._known and all(p.get_subscription_count() for p in topics)):
             if time.monotonic() > end:
                 return False
-            time.sleep(0.01)
+            rclpy.spin_once(self.node, timeout_sec=0.01)
         time.sleep(SETTLE_S)
         return True
 

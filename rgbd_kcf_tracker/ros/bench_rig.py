@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -97,8 +98,6 @@ class Listener:
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
 
     def _on_box(self, message: Any) -> None:
-        import time
-
         from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 
         stamp = stamp_to_ns(message.header.stamp)
@@ -108,6 +107,18 @@ class Listener:
         for status in message.status:
             if status.name.startswith(NAMESPACE):
                 self.diagnostics = {pair.key: pair.value for pair in status.values}
+
+    def await_tracker(self, process: subprocess.Popen[bytes], timeout_s: float = 60.0) -> None:
+        """Until the tracker knows this listener: its diagnostics, listened to last, have come.
+
+        Raises:
+            RuntimeError: where the process ends or says nothing.
+        """
+        end = time.monotonic() + timeout_s
+        while not self.diagnostics:
+            if process.poll() is not None or time.monotonic() > end:
+                raise RuntimeError('the tracker did not start')
+            self.spin(0.2)
 
     def spin(self, seconds: float) -> None:
         """Listen for at most that long."""

@@ -14,6 +14,7 @@ import argparse
 import json
 import sys
 import time
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -73,10 +74,14 @@ def measure(variant: str, size: str, rate: float, seconds: float, with_profile: 
     camera_arguments = ('--size', size, '--rate', str(rate), '--count', str(count))
     listener = Listener()
     try:
-        with (
-            child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env) as tracker,
-            child('rgbd_kcf_tracker.ros.bench_camera', *camera_arguments, env=env) as camera,
-        ):
+        with ExitStack() as children:
+            tracker = children.enter_context(
+                child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env)
+            )
+            listener.await_tracker(tracker)
+            camera = children.enter_context(
+                child('rgbd_kcf_tracker.ros.bench_camera', *camera_arguments, env=env)
+            )
             begin: tuple[float, float] | None = None
             end = (0.0, 0.0)
             while camera.poll() is None and tracker.poll() is None:
@@ -137,8 +142,8 @@ def table(results: list[Result]) -> str:
         width, height = SIZES[r.size]
         lines.append(
             f'| `{r.variant}` | {r.size} {width}x{height} | {r.rate_hz:g} | {r.sent} '
-            f'| {r.received} | {r.processed} | {r.dropped} | {r.boxes} | {r.median_ms:.1f} | {r.p95_ms:.1f} '
-            f'| {r.p99_ms:.1f} | {r.max_ms:.1f} | {r.cpu_cores:.2f} |'
+            f'| {r.received} | {r.processed} | {r.dropped} | {r.boxes} | {r.median_ms:.1f} '
+            f'| {r.p95_ms:.1f} | {r.p99_ms:.1f} | {r.max_ms:.1f} | {r.cpu_cores:.2f} |'
         )
     return '\n'.join(lines)
 

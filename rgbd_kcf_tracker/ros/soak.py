@@ -14,6 +14,7 @@ import argparse
 import json
 import sys
 import time
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -78,10 +79,14 @@ def run(frames: int, size: str, variant: str) -> Soak:
     samples: list[tuple[int, float, float]] = []
     listener = Listener()
     try:
-        with (
-            child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env) as tracker,
-            child('rgbd_kcf_tracker.ros.bench_camera', *camera_arguments, env=env) as camera,
-        ):
+        with ExitStack() as children:
+            tracker = children.enter_context(
+                child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env)
+            )
+            listener.await_tracker(tracker)
+            camera = children.enter_context(
+                child('rgbd_kcf_tracker.ros.bench_camera', *camera_arguments, env=env)
+            )
             while camera.poll() is None and tracker.poll() is None:
                 listener.spin(0.2)
                 done = len(listener.arrivals)
