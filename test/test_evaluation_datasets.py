@@ -19,13 +19,14 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sample,
     at_rate,
     from_first_view,
+    with_intrinsics,
     without_depth,
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import unrotate
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter
 
 WIDTH, HEIGHT = 64, 48
@@ -407,6 +408,8 @@ def test_thinning_out_keeps_the_asked_rate():
 def test_dropping_depth_and_starting_at_the_first_box():
     samples = [sample(0), sample(1, Box(0, 0, 2, 2)), sample(2)]
     assert all(s.frame.depth is None for s in without_depth(samples))
+    camera = Intrinsics(5, 5, 2, 2)
+    assert all(s.frame.intrinsics == camera for s in with_intrinsics(samples, camera))
     assert [s.frame.stamp_ns for s in from_first_view(samples)] == [1_000_000, 2_000_000]
 
 

@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, write_tracks
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.trackers import Track, TrackState
 
 KCF = Contender('kcf', 'variant', 'kcf')
@@ -155,6 +155,7 @@ def test_a_run_leaves_tracks_and_is_not_made_twice(tmp_path: Path):
         {'contender': Contender('kcf', 'variant', 'kcf', (('padding', '2.0'),))},
         {'options': RunOptions(use_depth=False)},
         {'options': RunOptions(rate_hz=5.0)},
+        {'options': RunOptions(intrinsics=Intrinsics(500, 500, 80, 60))},
         {'options': RunOptions(code='another version')},
     ],
 )

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_assignments
+from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
@@ -90,6 +90,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     group.add_argument('--no-depth', action='store_true', help='give the trackers colour alone')
     group.add_argument(
+        '--intrinsics', metavar='FX,FY,CX,CY',
+        help="camera of recordings in pixels, instead of their own",
+    )  # fmt: skip
+    group.add_argument(
         '--seeds', default='1', metavar='N', help='seeds of simulated scenes: 3, 1-5 (default 1)'
     )
     group.add_argument('--scenarios', metavar='A,B', help='only these simulated scenarios')
@@ -139,7 +143,14 @@ def run(args: argparse.Namespace) -> int:
     jobs = _default_jobs() if args.jobs is None else args.jobs
     if jobs < 1:
         raise ParameterError(f'--jobs is {jobs}: give 1 or more')
-    options = RunOptions(args.rate, not args.no_depth, args.short_term, jobs, args.fresh)
+    options = RunOptions(
+        rate_hz=args.rate,
+        use_depth=not args.no_depth,
+        short_term=args.short_term,
+        jobs=jobs,
+        fresh=args.fresh,
+        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+    )
     _check_writable(args.report)
 
     failures = _run(sequences, contenders, args.report, options)
@@ -285,6 +296,8 @@ def _in_words(args: argparse.Namespace) -> str:
         parts.append(f'{args.rate:g} Hz')
     if args.no_depth:
         parts.append('without depth')
+    if args.intrinsics is not None:
+        parts.append(f'camera {args.intrinsics}')
     if any(text.startswith('sim:') for text in args.dataset):
         parts.append(f'seeds {args.seeds} where none are given, {args.size}')
     parts.extend(args.param)

@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sequence,
     at_rate,
     from_first_view,
+    with_intrinsics,
     without_depth,
 )
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
@@ -34,6 +35,7 @@ from rgbd_kcf_tracker.evaluation.store import (
     write_tracks,
     write_truth,
 )
+from rgbd_kcf_tracker.geometry import Intrinsics
 
 _CODE = ('geometry.py', 'frame.py', 'features', 'filters', 'trackers', 'simulation', 'recordings')
 
@@ -60,6 +62,7 @@ class RunOptions:
         short_term: also run VOT's protocol with re-initialisation.
         jobs: parallel processes.
         fresh: run again what is already there.
+        intrinsics: of recordings, instead of their own; None leaves them.
         code: digest of the code; part of every run's key, the same in all processes of a run.
     """
 
@@ -68,6 +71,7 @@ class RunOptions:
     short_term: bool = False
     jobs: int = 1
     fresh: bool = False
+    intrinsics: Intrinsics | None = None
     code: str = field(default_factory=code_digest)
 
 
@@ -117,6 +121,7 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
     parts = [
         sequence.identity, contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,
+        repr(options.intrinsics),
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
 
@@ -233,6 +238,8 @@ def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterato
     samples: Any = from_first_view(opened.samples)
     if options.rate_hz is not None and sequence.kind != 'sim':  # scenes are rendered at their rate
         samples = at_rate(samples, options.rate_hz)
+    if options.intrinsics is not None and sequence.kind != 'sim':
+        samples = with_intrinsics(samples, options.intrinsics)
     if not options.use_depth:
         samples = without_depth(samples)
     yield from samples

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 CLEAR_FRACTION = 0.5
 """A target is clearly in view where at least this share of it shows."""
@@ -98,6 +98,13 @@ def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:
     """The samples as a colour camera gives them."""
     for sample in samples:
         yield dataclasses.replace(sample, frame=dataclasses.replace(sample.frame, depth=None))
+
+
+def with_intrinsics(samples: Iterable[Sample], intrinsics: Intrinsics) -> Iterator[Sample]:
+    """The samples as another camera's."""
+    for sample in samples:
+        frame = dataclasses.replace(sample.frame, intrinsics=intrinsics)
+        yield dataclasses.replace(sample, frame=frame)
 
 
 def at_rate(samples: Iterable[Sample], rate_hz: float) -> Iterator[Sample]:
