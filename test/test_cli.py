@@ -356,6 +356,18 @@ def test_info(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert COLOR in text
 
 
+def test_warnings_are_not_endless(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_folder(tmp_path / 'a', count=28)
+    for path in sorted((source / 'depth').iterdir())[1:]:
+        path.write_bytes(b'no image')
+    assert main(['track', str(source), '--variant', 'kcf']) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 21
+    assert 'further warnings are not shown' in lines[-1]
+    assert main(['info', str(source), '--check']) == 0
+    assert capsys.readouterr().out.count('read without depth') == 27
+
+
 def test_info_checks_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write_folder(tmp_path / 'a')
     assert main(['info', str(source), '--check']) == 0

@@ -114,6 +114,17 @@ def test_bad_images_are_named(tmp_path: Path) -> None:
         list(recording.frames())
 
 
+def test_depth_of_eight_bits_is_no_depth(tmp_path: Path) -> None:
+    """An error at once, as all images will be like that, not a warning for each."""
+    folder(tmp_path)
+    cv2.imwrite(str(tmp_path / 'depth' / '000001.png'), np.ones((48, 64), np.uint8))
+    with (
+        open_recording(tmp_path) as recording,
+        pytest.raises(ImageError, match=r'000001\.png: depth PNG has 1 channels of 8 bits'),
+    ):
+        list(recording.frames())
+
+
 def test_no_images(tmp_path: Path) -> None:
     (tmp_path / 'rgb').mkdir()
     with pytest.raises(RecordingError, match='holds no images'):

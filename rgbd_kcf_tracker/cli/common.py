@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.recordings import ReadOptions
 
 T = TypeVar('T')
+_MOST_WARNINGS = 20
 
 SOURCE_HELP = (
     'a recording: an .mcap file, a rosbag2 folder (mcap or sqlite3), a ROS 1 .bag, or a sequence '
@@ -145,8 +146,11 @@ class Warnings:
 
     def show(self) -> None:
         """Print those that are new."""
-        for text in self._warnings[self._shown :]:
-            warn(text)
+        for number in range(self._shown, len(self._warnings)):
+            if number < _MOST_WARNINGS:
+                warn(self._warnings[number])
+            elif number == _MOST_WARNINGS:
+                warn('further warnings are not shown: rgbd-kcf info --check lists all')
         self._shown = len(self._warnings)
 
 

@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.recordings.bag_topics import (
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
+    EncodingError,
     decode_color,
     decode_compressed_color,
     decode_compressed_depth,
@@ -161,7 +162,7 @@ class BagRecording:
             msg = self.bag.message(self._depth, index)
             return decode_compressed_depth(msg) if _compressed(self._depth) else decode_depth(msg)
         except RgbdKcfError as error:
-            if number == 0 or 'unknown depth encoding' in str(error):
+            if isinstance(error, EncodingError):
                 raise ImageError(
                     f'{self.path}, frame {number} of {self.topics.depth}: {error}'
                 ) from None

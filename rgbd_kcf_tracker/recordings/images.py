@@ -61,6 +61,10 @@ _MILLIMETRE = np.float32(0.001)
 _COMPRESSED_DEPTH_HEADER = struct.Struct('<iff')
 
 
+class EncodingError(ImageError):
+    """An image is sound but of a kind that is not read: the whole stream will be."""
+
+
 def decode_color(msg: Any) -> ColorImage:
     """The picture of a ``sensor_msgs/Image``.
 
@@ -75,7 +79,7 @@ def decode_color(msg: Any) -> ColorImage:
     """
     encoding = str(msg.encoding)
     if encoding not in _COLOR_ENCODINGS:
-        raise ImageError(_unknown_encoding('colour', encoding, _COLOR_ENCODINGS))
+        raise EncodingError(_unknown_encoding('colour', encoding, _COLOR_ENCODINGS))
     channels, conversion = _COLOR_ENCODINGS[encoding]
     rows = _rows(msg, channels)
     height, width = int(msg.height), int(msg.width)
@@ -102,7 +106,7 @@ def decode_depth(msg: Any) -> DepthImage:
     """
     encoding = str(msg.encoding)
     if encoding not in _DEPTH_ENCODINGS:
-        raise ImageError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
+        raise EncodingError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
     kind = _DEPTH_ENCODINGS[encoding]
     rows = np.ascontiguousarray(_rows(msg, int(kind[1])))
     values = rows.view(('>' if msg.is_bigendian else '<') + kind)
@@ -147,7 +151,7 @@ def decode_color_bytes(data: memoryview) -> ColorImage:
     """The picture in a JPEG, PNG or TIFF file's bytes; see :func:`decode_compressed_color`."""
     container = inspect(data)
     if container.bits != 8:
-        raise ImageError(
+        raise EncodingError(
             f'colour {container.name} has {container.bits} bits per channel: 8 expected '
             '(is this a depth topic?)'
         )
@@ -164,7 +168,7 @@ def decode_depth_bytes(data: memoryview, text: str = '') -> DepthImage:
     """
     kind = sniff(data)
     if kind == JPEG:
-        raise ImageError('depth is JPEG, which spoils it: record compressedDepth or raw depth')
+        raise EncodingError('depth is JPEG, which spoils it: record compressedDepth or raw depth')
     if kind in (PNG, TIFF):
         return _bare_depth(data)
     if len(data) <= _COMPRESSED_DEPTH_HEADER.size:
@@ -243,7 +247,7 @@ def _rows(msg: Any, bytes_per_pixel: int) -> npt.NDArray[np.uint8]:
 def _bare_depth(data: memoryview) -> DepthImage:
     container = inspect(data)
     if container.channels != 1 or container.bits not in (16, 32):
-        raise ImageError(
+        raise EncodingError(
             f'depth {container.name} has {container.channels} channels of {container.bits} bits: '
             'one of 16 (mm) or 32 (float metres) expected'
         )
@@ -252,13 +256,13 @@ def _bare_depth(data: memoryview) -> DepthImage:
         return metres_from_mm(cast(Any, values))
     if values.dtype == np.float32:
         return metres_from_float(cast(Any, values))
-    raise ImageError(f'depth {container.name} holds {values.dtype}: uint16 or float32 expected')
+    raise EncodingError(f'depth {container.name} holds {values.dtype}: uint16 or float32 expected')
 
 
 def _decode_png16(data: memoryview) -> npt.NDArray[np.uint16]:
     container = inspect(data)
     if container.channels != 1 or container.bits != 16:
-        raise ImageError(
+        raise EncodingError(
             f'compressed depth PNG has {container.channels} channels of {container.bits} bits: '
             'one of 16 expected'
         )

@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.recordings.containers import inspect
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
+    EncodingError,
     decode_color_bytes,
     decode_depth_bytes,
 )
@@ -174,6 +175,8 @@ class SequenceFolder:
     def _decode_depth(self, path: Path) -> DepthImage | None:
         try:
             return decode_depth_bytes(memoryview(_read(path)))
+        except EncodingError as error:
+            raise ImageError(f'{path}: {error}') from None
         except ImageError as error:
             self.warnings.append(f'{path}: {error}; the frame is read without depth')
             return None
