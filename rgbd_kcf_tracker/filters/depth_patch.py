@@ -26,7 +26,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.features.depth_patch import Depth
 
 # Unevenness of a body and noise of the camera, metres.
-_NOISE = 0.1
+_NOISE = 0.2
 # What a walking person gathers or loses of speed, metres per second squared.
 _ACCELERATION = 3.0
 # By how much a walking body sways between two frames, metres.

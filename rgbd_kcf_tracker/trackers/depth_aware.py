@@ -16,6 +16,8 @@ from rgbd_kcf_tracker.parameters import parameter
 from rgbd_kcf_tracker.trackers.kcf import Detection, KcfModel, KcfParameters
 from rgbd_kcf_tracker.trackers.track import Track, TrackState, require_inside
 
+# Response at which a patch surely shows the target (thesis Algorithm 1, step 10).
+_DETECTED = 0.5
 # A pause longer than this says nothing about how far the target went: it is taken for this long.
 _LONGEST_INTERVAL_S = 1.0
 
@@ -207,7 +209,7 @@ class DepthAwareTracker(ABC):
         model.train(frame, self._box.cx, self._box.cy, trust)
         if frame.depth is None:
             return
-        if again or (trust >= 0.5 and found.response >= self._high):
+        if again or (trust >= 0.5 and found.response >= _DETECTED):
             patch = centre_patch(frame.depth, self._box, self._depth_parameters.center_share)
             self._depth_patch.remember(patch, None if again else interval)
         elif difference is not None:

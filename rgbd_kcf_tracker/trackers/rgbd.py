@@ -123,10 +123,8 @@ class RgbdTracker(DepthAwareTracker):
         strip = self._strip(frame, model, offsets)
         offsets, cx = offsets[inside], cx[inside]
         stack = windows(strip, model.taper, offsets)
-        responses = model.filter.respond(stack)
-        if model.filter is not model.first:
-            # The first template, which nothing that was learned by mistake has touched.
-            responses = np.maximum(responses, model.first.respond(stack))
+        # The first template beside the model: nothing that was learned by mistake has touched it.
+        responses = np.maximum(model.filter.respond(stack), model.first.respond(stack))
         middle = int(np.flatnonzero(offsets == 0)[0])
         index = int(np.argmax(responses.max(axis=(1, 2))))
         best = model.place(responses[index], float(cx[index]), self._box.cy)
