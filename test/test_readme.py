@@ -1,0 +1,42 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the README and docs/ point to exists."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from rgbd_kcf_tracker.trackers import VARIANTS
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / 'README.md', ROOT / 'QUALITY_DECLARATION.md', *sorted((ROOT / 'docs').glob('*.md'))]
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text(encoding='utf-8')):
+        if re.match(r'[a-z]+:', target) or target.startswith('#'):
+            continue
+        assert (page.parent / target.partition('#')[0]).exists(), f'{page.name}: {target}'
+
+
+def test_make_has_the_targets_that_the_readme_names() -> None:
+    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    for target in {'demo', 'test'} | set(re.findall(r'`make (\w+)', readme)):
+        assert re.search(rf'^{target}:', makefile, re.MULTILINE), f'make {target}'
+    assert 'make test' in (ROOT / '.ci' / 'run').read_text(encoding='utf-8')
+
+
+def test_readme_names_every_variant_and_command() -> None:
+    from rgbd_kcf_tracker.cli import main
+
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    for variant in VARIANTS:
+        assert f'| `{variant}` |' in readme
+    for name in main.SUBCOMMANDS:
+        assert f'`rgbd-kcf {name}' in readme
