@@ -263,3 +263,20 @@ def test_any_camera_info_is_a_camera_or_refused(values: list[float], width: int)
     except RgbdKcfError:
         return
     assert camera is None or (camera.fx > 0 and camera.fy > 0)
+
+
+def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
+    faults: list[str] = []
+    made = processor(faults)
+    answers: list[Track] = []
+    made._publishers.publish = lambda header, track, size: answers.append(track)
+    image = image_message(HEADER, np.zeros((60, 80, 3), np.uint8), 'bgr8')
+    made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), lambda _: Box(20, 20, 20, 20))
+
+    def broken(_: Frame) -> Track:
+        raise ZeroDivisionError('broken')
+
+    made.session._tracker = SimpleNamespace(update=broken)
+    made(Capture(image, None, None, 0))
+    assert [track.state for track in answers] == [TrackState.OCCLUDED]
+    assert faults == ['internal error: ZeroDivisionError: broken']

@@ -25,6 +25,7 @@ START = 30
 NAMESPACE = '/rgbd_kcf_benchmark'
 FRAME_ID = 'kinect2_rgb_optical_frame'
 MATCH_TIMEOUT_S = 30.0
+ANSWER_TIMEOUT_S = 20.0
 SETTLE_S = 0.5
 
 
@@ -119,11 +120,11 @@ class Camera:
 
         order = self._order()
         for index in range(count):
-            end = time.monotonic() + 5.0
+            end = time.monotonic() + ANSWER_TIMEOUT_S
             while index - self._answers >= ahead and time.monotonic() < end:
                 rclpy.spin_once(self.node, timeout_sec=0.5)
             if index - self._answers >= ahead:
-                raise SystemExit(f'no answer to pair {index} within 5 s')
+                raise SystemExit(f'no answer to pair {index} within {ANSWER_TIMEOUT_S:g} s')
             self._send(next(order))
 
     def await_delivery(self) -> None:

@@ -105,13 +105,15 @@ class Processor:
         track = IDLE
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
-            if frame is None:
-                # Nothing can be seen: no box, and the target is as it was.
-                hidden = session.track.state is not TrackState.IDLE
-                track = Track(None, TrackState.OCCLUDED) if hidden else IDLE
-            else:
+            track = self._unseen()
+            if frame is not None:
                 size = frame.width, frame.height
-                track = session.process(frame)
+                try:
+                    track = session.process(frame)
+                except Exception as error:  # a bug in a tracker must not leave a pair unanswered
+                    self._fault(
+                        'internal_errors', f'internal error: {type(error).__name__}: {error}'
+                    )
         self._publishers.publish(header, track, size)
         latency = self._now_ns() - stamp_to_ns(header.stamp)
         work = time.monotonic_ns() - capture.arrival_ns
@@ -119,6 +121,11 @@ class Processor:
         self._last = capture, moment.time_ns
         if frame is not None:
             self._publishers.publish_extras(header, track, frame, frame.intrinsics)
+
+    def _unseen(self) -> Track:
+        """The answer where nothing can be seen: no box, and the target is as it was."""
+        hidden = self.session.track.state is not TrackState.IDLE
+        return Track(None, TrackState.OCCLUDED) if hidden else IDLE
 
     def choose(self, choice: Choice, oldest_s: float) -> None:
         """Start on the newest image, or the next one where the newest is old or shows nothing."""

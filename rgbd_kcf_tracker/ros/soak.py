@@ -95,6 +95,8 @@ def run(frames: int, size: str, variant: str) -> Soak:
             if tracker.poll() is not None or not samples:
                 raise RuntimeError(f'the tracker stopped after {len(listener.arrivals)} answers')
             samples.append((len(listener.arrivals), time.monotonic(), resident_mb(tracker.pid)))
+            if len(listener.arrivals) < frames:
+                print(f'diagnostics at the end: {listener.diagnostics}', file=sys.stderr)
     finally:
         listener.close()
     arrived = np.array([came for _, came, _ in listener.arrivals], dtype=np.int64)
