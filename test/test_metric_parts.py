@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.features.color_bands import (
     band_histograms,
     band_similarity,
     color_codes,
+    view_lab,
 )
 from rgbd_kcf_tracker.features.depth_view import DepthView
 from rgbd_kcf_tracker.features.floor import FloorFinder
@@ -136,7 +137,7 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     color = np.zeros((80, 40, 3), np.uint8)
     color[:40] = (200, 30, 30)
     color[40:] = (30, 30, 200)
-    codes, _ = color_codes(color, 1, (80, 40))
+    codes = color_codes(view_lab(color, 1, (80, 40)))
     mask = np.ones((80, 40), bool)
     counts = band_histograms(codes, mask, 0, 80)
     assert counts.shape == (BANDS, CODES)
@@ -148,6 +149,20 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     # The lower half alone is like the lower half of the body, not like the whole.
     lower = band_histograms(codes[40:], mask[40:], -40, 80)
     assert band_similarity(lower, model) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_colours_compare_before_and_after_a_change_of_light():
+    rng = np.random.default_rng(0)
+    depth = wall()
+    dark = cv2.GaussianBlur(rng.integers(0, 140, (160, 240, 3), dtype=np.uint8), (0, 0), 5)
+    reader = SceneReader(240, 0.04, 0.03, 0.0, 0)
+    before = reader.read(Frame(dark, depth, 0, CAMERA)).codes
+    # Every pixel 1.5 times as bright, from one frame to the next.
+    light = np.clip(dark * 1.5, 0, 255).astype(np.uint8)
+    after = reader.read(Frame(light, depth, 1, CAMERA)).codes
+    assert np.mean(after >> 6 == before >> 6) > 0.8
+    still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA)).codes
+    assert np.mean(still >> 6 == before >> 6) < 0.5
 
 
 def test_posterior_is_bayes_with_even_odds():
@@ -339,6 +354,7 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
     for worse in (
         {'step': 40.0, 'stride': 6.0},
         {'pale': 0.5, 'step': 12.0, 'stride': 2.0},
+        {'pale': 0.95},
         {'known': 1.0, 'kin': 1.0, 'hidden': 0.5},
         {'fraction': 0.08},
         {'height': -8.0, 'pale': 0.3},

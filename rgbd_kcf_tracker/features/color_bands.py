@@ -26,10 +26,10 @@ _CHROMA = np.clip(
 ).astype(np.uint16)
 
 
-def color_codes(
+def view_lab(
     color: npt.NDArray[np.uint8], step: int, shape: tuple[int, int]
-) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.uint8]]:
-    """Code 0 to 511 of every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
+) -> npt.NDArray[np.uint8]:
+    """CIE Lab of every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
 
     Args:
         color: the image.
@@ -37,15 +37,28 @@ def color_codes(
         shape: rows and columns of the result.
 
     Returns:
-        ``shape`` int32: 64 times lightness plus 8 times red-green plus blue-yellow (CIE Lab), and
-        ``shape + (3,)`` uint8, the Lab colours themselves.
+        ``shape + (3,)`` uint8.
     """
     half = step // 2
     small = np.ascontiguousarray(color[half::step, half::step][: shape[0], : shape[1]])
-    lab = cv2.cvtColor(small, cv2.COLOR_BGR2LAB)
-    codes = (_LIGHTNESS[lab[:, :, 0]] << 6) + (_CHROMA[lab[:, :, 1]] << 3) + _CHROMA[lab[:, :, 2]]
+    lab: npt.NDArray[np.uint8] = cv2.cvtColor(small, cv2.COLOR_BGR2LAB)
+    return lab
+
+
+def color_codes(lab: npt.NDArray[np.uint8], brighter: float = 0.0) -> npt.NDArray[np.int32]:
+    """Code 0 to 511 of each pixel: 64 times lightness plus 8 times red-green plus blue-yellow.
+
+    Args:
+        lab: ``(h, w, 3)`` uint8 CIE Lab.
+        brighter: by how much the light has gone up since the codes were first used, 0 to 255;
+            taken off again, so that codes before and after a change of light compare.
+    """
+    lightness = lab[:, :, 0]
+    if brighter:
+        lightness = np.clip(lightness - np.float32(brighter), 0, 255).astype(np.uint8)
+    codes = (_LIGHTNESS[lightness] << 6) + (_CHROMA[lab[:, :, 1]] << 3) + _CHROMA[lab[:, :, 2]]
     result: npt.NDArray[np.int32] = codes.astype(np.int32)
-    return result, lab
+    return result
 
 
 def band_histograms(

@@ -10,12 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.features.color_bands import color_codes
+from rgbd_kcf_tracker.features.color_bands import color_codes, view_lab
 from rgbd_kcf_tracker.features.depth_view import DepthView
 from rgbd_kcf_tracker.features.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.features.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.features.surfaces import Surfaces, cut, standing
 from rgbd_kcf_tracker.frame import Frame
+
+SUDDEN = 4.0
+"""Change of median lightness (of 255) from one frame to the next that is a change of light."""
+LIGHT_STEP = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +70,8 @@ class SceneReader:
         self._floors = FloorFinder(seed)
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
+        self._lightness: npt.NDArray[np.int16] | None = None
+        self._brighter = 0.0
         self.last_view: DepthView | None = None
 
     def read(self, frame: Frame) -> Scene | None:
@@ -82,5 +88,16 @@ class SceneReader:
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
-        codes, lab = color_codes(frame.color, view.step, view.shape)
+        lab = view_lab(frame.color, view.step, view.shape)
+        codes = color_codes(lab, self._light(lab))
         return Scene(view, floor, surfaces, self._rim, codes, lab)
+
+    def _light(self, lab: npt.NDArray[np.uint8]) -> float:
+        """How much brighter the scene is than at first, by sudden changes of all of it."""
+        lightness = lab[::LIGHT_STEP, ::LIGHT_STEP, 0].astype(np.int16)
+        if self._lightness is not None and self._lightness.shape == lightness.shape:
+            change = float(np.median(lightness - self._lightness))
+            if abs(change) >= SUDDEN:
+                self._brighter = float(np.clip(self._brighter + change, -128, 128))
+        self._lightness = lightness
+        return self._brighter

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+OTHER_COLORS = 0.2
+"""Loss of likeness from which it is another colour rather than another light."""
 FADE = 1.0
 """Seconds after which a hidden target's last place says a third of what it said."""
 
@@ -52,7 +54,6 @@ class Evidence:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
         near = float(np.exp(-self.hidden / FADE))
         away = 1.0 if self.hidden > 0 else 0.0
-        pale = min(self.pale, 0.5)
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -60,7 +61,8 @@ class Evidence:
                 np.log1p(self.step) * near,
                 np.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
-                pale,
+                self.pale,
+                max(0.0, self.pale - OTHER_COLORS),
                 self.known,
                 self.kin,
                 more**2,
@@ -68,7 +70,7 @@ class Evidence:
                 max(self.height, -8.0),
                 away,
                 np.log1p(self.hidden),
-                away * pale,
+                away * self.pale,
                 away * self.known,
                 away * self.kin,
                 away * less,
@@ -81,8 +83,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.823, -1.552, -0.103, -6.341, -1.444, -2.268, -2.593, -3.686, 0.646,
-        -0.854, -1.211, 1.586, -2.108, 0.605, 1.153, -0.366, -3.094, 6.648,
+        -0.657, -1.667, -0.117, -7.108, -2.571, -1.530, -1.438, -2.488, -3.624, 0.646,
+        -0.688, -1.093, 2.362, -2.029, 0.176, 1.006, -0.472, -3.148, 6.552,
     )
 )  # fmt: skip
 

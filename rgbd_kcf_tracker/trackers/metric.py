@@ -24,7 +24,7 @@ LONGEST_STEP = 5.0
 """Seconds between two frames; stamps that stand still or jump are taken as these."""
 ATTEND = 1.0
 """Seconds after which the look of a target followed by its surface is learned again."""
-BLIND = 0.5
+BLIND = 0.25
 """Share of the expected body without a reading from which depth says nothing of it."""
 RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
