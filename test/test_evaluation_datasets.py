@@ -97,6 +97,17 @@ def test_our_layout_starts_where_the_target_is_clearly_in_view(own: Path):
     assert samples[0].body == Box(1, 2, 10, 30)
 
 
+def test_a_sequence_is_another_one_when_its_files_change(own: Path):
+    (before,) = open_dataset(str(own))
+    (same,) = open_dataset(str(own))
+    assert before.identity == same.identity
+    write_images(own / 'rgb', ['000005.png'])
+    (more,) = open_dataset(str(own))
+    (own / 'groundtruth.txt').write_text('1,2,10,20\n' * 4)
+    (other,) = open_dataset(str(own))
+    assert len({before.identity, more.identity, other.identity}) == 3
+
+
 def test_several_people_in_one_folder(tmp_path: Path):
     path = tmp_path / 'room'
     write_images(path / 'rgb', numbered(40, 6, '.png'))

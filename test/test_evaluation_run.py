@@ -166,6 +166,13 @@ def test_a_run_is_made_again_when_anything_that_decides_it_changes(tmp_path: Pat
     assert not is_done(tmp_path, **{**same, **change})
 
 
+def test_pictures_of_another_rate_do_not_stay(tmp_path: Path):
+    folder = tmp_path / 'thumbs' / 'a'
+    for count, kept in ((8, 8), (3, 3)):
+        runner.run([sequence('a', count)], [KCF], tmp_path, RunOptions())
+        assert len(list(folder.glob('*.jpg'))) == kept
+
+
 def test_a_run_that_was_cut_off_is_made_again(tmp_path: Path):
     runner.run([sequence('a')], [KCF], tmp_path, RunOptions())
     meta_path(tracks_path(tmp_path, 'kcf', 'a')).write_text('{"key": ')
@@ -381,7 +388,7 @@ def test_contenders_have_names_of_their_own():
         contenders.variant('deep')
     with pytest.raises(ParameterError, match='give NAME=FOLDER'):
         contenders.boxes('peer')
-    with pytest.raises(ParameterError, match="two trackers are named 'a'"):
+    with pytest.raises(ParameterError, match="two trackers are named 'a' and 'a'"):
         contenders.unique([Contender('a', 'boxes', 'x'), Contender('a', 'boxes', 'y')])
     assert contenders.unique([KCF, KCF]) == [KCF]
 

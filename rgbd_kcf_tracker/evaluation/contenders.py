@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.evaluation.store import slug
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import describe, with_overrides
@@ -185,8 +186,12 @@ def unique(contenders: Iterable[Contender]) -> list[Contender]:
     """
     result: dict[str, Contender] = {}
     for contender in contenders:
-        if result.setdefault(contender.name, contender) != contender:
-            raise ParameterError(f'two trackers are named {contender.name!r}: rename one')
+        other = result.setdefault(slug(contender.name), contender)
+        if other != contender:
+            raise ParameterError(
+                f'two trackers are named {other.name!r} and {contender.name!r}: their results '
+                'would lie in one place, rename one'
+            )
     return list(result.values())
 
 

@@ -173,8 +173,7 @@ def _run_sequence(job: Job) -> list[Failure]:
         truth_path(job.folder, sequence.name),
         stamps, [s[1] for s in samples], body, [s[3] for s in samples],
     )  # fmt: skip
-    for index, data in thumbnails.pictures.items():
-        write_atomically(job.folder / 'thumbs' / slug(sequence.name) / f'{index:06d}.jpg', data)
+    _write_thumbnails(job.folder / 'thumbs' / slug(sequence.name), thumbnails)
 
     failures = []
     for contender in job.contenders:
@@ -192,6 +191,15 @@ def _run_sequence(job: Job) -> list[Failure]:
             | {'image_size': size, 'thumbnail_scale': thumbnails.scale},
         )
     return failures
+
+
+def _write_thumbnails(folder: Path, thumbnails: Thumbnails) -> None:
+    pictures = {f'{index:06d}.jpg': data for index, data in thumbnails.pictures.items()}
+    for old in folder.glob('*.jpg'):  # of the same sequence at another rate, say
+        if old.name not in pictures:
+            old.unlink(missing_ok=True)
+    for name, data in pictures.items():
+        write_atomically(folder / name, data)
 
 
 def _from_file(contender: Contender, sequence: Sequence, opened: Opened, frames: int) -> OnePass:

@@ -27,6 +27,7 @@ TAIL_FRAMES = 15
 """Frames after a person was last seen that still count: the tracker must say that they are gone."""
 
 _BODY = 'groundtruth_body.txt'
+_PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', 'intrinsics.json')
 
 
 def is_sequence(path: Path) -> bool:
@@ -41,7 +42,15 @@ def find(path: Path, fps: float) -> list[Sequence]:
     for truth in people or [path / 'groundtruth.txt']:
         person = truth.stem.removeprefix('groundtruth').removeprefix('_')
         visible = path / (f'visible_{person}.txt' if person else 'visible.txt')
-        files = (truth, visible, path / _BODY, path / 'timestamps.txt', path / 'intrinsics.json')
+        files = (
+            truth,
+            visible,
+            path / 'rgb',
+            path / 'depth',
+            path / _BODY,
+            path / 'timestamps.txt',
+            path / 'intrinsics.json',
+        )
         result.append(
             Sequence(
                 name=f'{path.name}/{person}' if person else path.name,

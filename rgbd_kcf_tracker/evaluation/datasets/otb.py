@@ -58,7 +58,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
                 scenario=path.parent.name or 'otb',
                 kind='otb',
                 open=partial(load, path, file, fps),
-                identity=f'otb:{file_token(file)}:{fps}',
+                identity=f'otb:{file_token(file, *(path / n for n in IMAGE_FOLDERS))}:{fps}',
                 origin=ORIGIN,
                 path=path,
             )

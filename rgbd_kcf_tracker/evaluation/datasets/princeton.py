@@ -30,6 +30,7 @@ MAT_FILES = ('framesNEW.mat', 'frames.mat')
 """The first that is there is taken: framesNEW.mat is DS-KCF's better pairing of the same images."""
 
 CATEGORIES_FILE = 'categories.csv'
+_PARTS = ('init.txt', 'rgb', 'depth')
 
 
 def is_sequence(path: Path) -> bool:
@@ -45,7 +46,7 @@ def find(path: Path, categories: Mapping[str, Mapping[str, str]]) -> Sequence:
         scenario=path.parent.name or 'princeton',
         kind='princeton',
         open=partial(load, path),
-        identity=f'princeton:{file_token(truth, path / "init.txt", _mat(path))}',
+        identity=f'princeton:{file_token(truth, _mat(path), *(path / n for n in _PARTS))}',
         categories=categories.get(path.name, {}),
         path=path,
     )

@@ -29,6 +29,8 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.textfiles import read_lines
 
+_PARTS = ('sequence', 'color', 'depth')
+
 
 def is_sequence(path: Path) -> bool:
     """Whether a folder is a VOT sequence."""
@@ -54,7 +56,7 @@ def find(path: Path, fps: float) -> Sequence:
         scenario=path.parent.name or 'vot',
         kind='vot',
         open=partial(load, path, fps),
-        identity=f'vot:{file_token(truth, path / "sequence")}:{fps}',
+        identity=f'vot:{file_token(truth, *(path / n for n in _PARTS))}:{fps}',
         path=path,
     )
 
