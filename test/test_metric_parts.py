@@ -355,7 +355,7 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
         {'step': 40.0, 'stride': 6.0},
         {'pale': 0.5, 'step': 12.0, 'stride': 2.0},
         {'pale': 0.95},
-        {'known': 1.0, 'kin': 1.0, 'hidden': 0.5},
+        {'known': 1.0, 'kin': 1.0, 'hidden': 0.5, 'step': 4.0, 'stride': 0.5},
         {'fraction': 0.08},
         {'height': -8.0, 'pale': 0.3},
     ):
