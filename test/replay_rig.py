@@ -141,6 +141,12 @@ class Listener:
             time.sleep(0.02)
         time.sleep(0.3)  # discovery is one-sided
 
+    def await_boxes(self, count: int, timeout: float = 20.0) -> None:
+        """Until so many answers have come, or time is up."""
+        end = time.monotonic() + timeout
+        while len(self.boxes) < count and time.monotonic() < end:
+            time.sleep(0.02)
+
     def _spin(self) -> None:
         with suppress(ExternalShutdownException):
             self.executor.spin()

@@ -81,6 +81,7 @@ def test_at_camera_rate_with_a_live_tracker(bag: Path, tmp_path: Path) -> None:
         heard.await_tracker()
         status, output = rig.run_replay(tmp_path, bag=str(bag), report=str(report))
         assert status == 0, output
+        heard.await_boxes(len(rig.frames()))
     figures = json.loads(report.read_text())
     count = len(rig.frames())
     assert figures['color_images'] == figures['depth_images'] == count
@@ -130,7 +131,7 @@ def test_start_topics_and_loop(bag: Path, tmp_path: Path) -> None:
             process.send_signal(signal.SIGTERM)
             began = time.monotonic()
             output, _ = process.communicate(timeout=10)
-            assert time.monotonic() - began < 1.5
+            assert time.monotonic() - began < 3.0
         finally:
             process.kill()
     assert process.returncode == 0, output

@@ -132,6 +132,27 @@ def test_answers_without_a_depth_topic_and_given_up() -> None:
     assert answers.wait(0.0, threading.Event())
 
 
+def test_late_answers_are_waited_for_as_long_as_they_come() -> None:
+    answers = Answers(has_depth=False)
+    stop = threading.Event()
+    for stamp in range(6):
+        answers.sent_color(stamp)
+
+    def slow_tracker() -> None:
+        for stamp in range(4):
+            time.sleep(0.1)
+            answers.answered(stamp)
+
+    thread = threading.Thread(target=slow_tracker)
+    thread.start()
+    assert not answers.drain(0.3, stop)  # the last two were dropped
+    thread.join()
+    assert len(answers.latencies_s) == 4
+    answers.answered(4)
+    answers.answered(5)
+    assert answers.drain(0.3, stop)
+
+
 def test_foreign_and_early_answers_do_no_harm() -> None:
     answers = Answers(has_depth=True)
     for stamp in range(5000):

@@ -96,6 +96,15 @@ class Answers:
                 self._changed.wait(min(left, 0.1))
         return True
 
+    def drain(self, quiet_s: float, stop: threading.Event) -> bool:
+        """Wait as long as answers still come; False where some are missing after ``quiet_s``."""
+        seen = -1
+        while seen != len(self.latencies_s) and not stop.is_set():
+            seen = len(self.latencies_s)
+            if self.wait(quiet_s, stop):
+                return True
+        return False
+
     def give_up(self) -> list[int]:
         """Wait no longer for what is unanswered; returns its stamps."""
         with self._changed:

@@ -187,7 +187,7 @@ class ReplayNode(Node):
                 if parameters.reliability == 'reliable':
                     publisher.wait_for_all_acked(Duration(seconds=1))
             if self._answers is not None and self.count_publishers(parameters.answer_topic):
-                answers.wait(1.0, stop)
+                answers.drain(1.0, stop)
         answers.give_up()
         figures = figures_of(player, answers, seconds)
         self.get_logger().info(summary(figures))
