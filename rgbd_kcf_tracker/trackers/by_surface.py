@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
 
 FloatArray = npt.NDArray[np.float64]
 
-LOCK_IOU = 0.35
+LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
 FIRST_SIGMA = 0.05
 HIDDEN_NOISE = 0.5
