@@ -114,12 +114,13 @@ def test_frames_dropped(live: Live) -> None:
     live.goes_on(first + 20)
 
 
-def test_depth_late_but_in_time(live: Live) -> None:
+def test_depth_late_but_in_time(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     first = live.begin()
     rig, since = live.rig, len(live.rig.boxes)
+    monkeypatch.setattr(live.node._intake, '_wait_ns', 5 * SECOND)
     for index in range(first, first + 4):
         rig.send_color(index)
-        time.sleep(0.05)
+        time.sleep(0.1)
         rig.send_depth(index)
     live.answered(since, 4)
     assert live.added('color_without_depth') == 0

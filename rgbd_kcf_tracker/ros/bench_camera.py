@@ -41,6 +41,7 @@ def main(args: list[str] | None = None) -> int:
     options = parser.parse_args(args)
     keep_large_blocks()
     import rclpy
+    from rclpy.executors import ExternalShutdownException
 
     rclpy.init()
     camera = Camera(options.size, options.frames, options.compressed)
@@ -52,7 +53,7 @@ def main(args: list[str] | None = None) -> int:
         else:
             camera.play_answered(options.count, options.ahead)
         camera.await_delivery()
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
         camera.node.destroy_node()
