@@ -52,7 +52,7 @@ def _textures() -> tuple[np.ndarray, np.ndarray]:
 def scene(index: int) -> tuple[np.ndarray, np.ndarray, Box]:
     """Frame ``index`` of a textured upright thing at 2 m that sways before a wall at 4 m."""
     wall, target = _textures()
-    color, depth = wall.copy(), np.full((HEIGHT, WIDTH), 4000, np.uint16)
+    color, depth = wall.copy(), np.full((HEIGHT, WIDTH), 60.0, np.uint16)
     x, y = round(140 + 50 * np.sin(index / 15)), 90
     color[y : y + 60, x : x + 36] = target
     depth[y : y + 60, x : x + 36] = 2000
@@ -164,7 +164,7 @@ class Rig:
 
     # --- what came back ---
 
-    def wait(self, condition: Callable[[], bool], timeout: float = 20.0, what: str = '') -> None:
+    def wait(self, condition: Callable[[], bool], timeout: float = 60.0, what: str = '') -> None:
         end = time.monotonic() + timeout
         while not condition():
             if time.monotonic() > end:
@@ -199,14 +199,14 @@ class Rig:
         listener was announced last.
         """
         topics = (self.color, self.depth, self.info, self.init, self.init_point)
-        self.wait(lambda: all(p.get_subscription_count() for p in topics), 40.0, 'the tracker')
+        self.wait(lambda: all(p.get_subscription_count() for p in topics), 60.0, 'the tracker')
         if tracker is not None:
             outputs = tracker._outputs
             heard = (outputs._box, outputs._occluded, outputs._roi, outputs._position)
-            self.wait(lambda: all(p.get_subscription_count() for p in heard), 40.0, 'its answers')
+            self.wait(lambda: all(p.get_subscription_count() for p in heard), 60.0, 'its answers')
             return
         name = f'{self.tracker}: tracker'
-        self.wait(lambda: any(d.name == name for d in self.diagnostics), 40.0, 'diagnostics')
+        self.wait(lambda: any(d.name == name for d in self.diagnostics), 60.0, 'diagnostics')
 
 
 def overrides(values: dict[str, Any]) -> list[Parameter]:
@@ -259,9 +259,9 @@ def tracker_process(*arguments: str, **popen: Any) -> Iterator[subprocess.Popen[
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
             try:
-                process.wait(5)
+                process.wait(20)
             except subprocess.TimeoutExpired:
                 process.kill()
         if process.stdout is not None and not process.stdout.closed:
             process.stdout.close()
-        process.wait(5)
+        process.wait(20)

@@ -202,7 +202,7 @@ def test_bad_overrides_leave_defaults_and_a_message(rig: Rig) -> None:
         rig.play(range(2))
         values = rig.fresh_values()
         process.terminate()
-        assert process.wait(5) == 0
+        assert process.wait(20) == 0
         output = process.stdout.read()
     assert values['bad_parameters'] == '5'
     assert 'parameter learning_rate is 7.5: it must be between 0 and 1' in output.replace(

@@ -113,7 +113,8 @@ def test_kinect2_bridge_compressed(rig: Rig, depth_format: str) -> None:
             f'{name}_transport:=compressed',
         ]
     with tracker_process(*remaps, '-p', f'init_box:={box_text()}', '-p', 'queue_policy:=all'):
-        rig.wait(lambda: rig.node.count_publishers('/tracker/box') > 0)
+        name = '/tracker: tracker'
+        rig.wait(lambda: any(d.name == name for d in rig.diagnostics), what='the tracker')
         for index in range(4):
             color, depth, _ = scene(index)
             header = rig.header(index)
