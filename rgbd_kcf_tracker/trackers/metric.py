@@ -43,14 +43,19 @@ class MetricTracker:
         self._surface: BySurface | None = None
         self._look: ByLook | None = None
         self._reader: SceneReader | None = None
+        self._scene: Scene | None = None
         self._stamp_ns = 0
         self._hidden_for = 0.0
         self._agreed = 0
 
-    @property
-    def candidates(self) -> list[Candidate]:
-        """What was weighed in the last frame, best first; empty while following by look."""
-        return self._surface.candidates if self._surface is not None else []
+    def weighed(self) -> list[tuple[Candidate, Box]]:
+        """What was weighed in the last frame, best first, and the box each would have given.
+
+        Empty while the target is followed by its look.
+        """
+        if self._surface is None or self._scene is None:
+            return []
+        return [(c, self._surface.box(self._scene, c)) for c in self._surface.candidates]
 
     def start(self, frame: Frame, box: Box) -> Track:
         """See :meth:`~rgbd_kcf_tracker.trackers.track.Tracker.start`."""
@@ -75,6 +80,7 @@ class MetricTracker:
         dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
         self._stamp_ns = frame.stamp_ns
         scene = self._reader.read(frame) if self._parameters.use_surfaces else None
+        self._scene = scene
         if self._surface is None:
             track = self._by_look(frame, scene, dt)
         else:

@@ -1,0 +1,241 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Fits the weights by which ``metric`` decides, to candidates that it meets on benchmarks.
+
+``python -m rgbd_kcf_tracker.evaluation.evidence_fit DATASET... [--rates 30,15,10,5]`` runs the
+tracker, labels each candidate by its overlap with the truth, and prints the weights, how often they
+decide rightly on scenarios that were left out of the fit, and how well their probabilities are
+calibrated. What is printed goes into ``filters/evidence.py``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize
+
+from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
+from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
+from rgbd_kcf_tracker.evaluation.datasets.base import at_rate, with_intrinsics
+from rgbd_kcf_tracker.filters.evidence import OTHER_COLORS, WEIGHTS
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.trackers.metric import MetricTracker
+from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
+
+FloatArray = npt.NDArray[np.float64]
+
+RIGHT, WRONG = 0.5, 0.3
+"""Overlaps from which a candidate is the target, and below which it is not; between, left out."""
+ASTRAY, BACK = 2, 8
+"""Frames on something else after which a run teaches nothing, and on the target until it does."""
+REAL_WEIGHT, SPARSE_WEIGHT = 4.0, 2.0
+"""Weight of candidates from recordings, and of those at less than 20 Hz, against 30 Hz scenes."""
+SPARSE_HZ = 20.0
+PALE_WEIGHT = 0.01
+PALE_RANGE = (0.6, 0.95)
+"""Weight and loss of likeness of the target's places with a thing of wholly other colours there."""
+PALE, FAR, AWAY, AWAY_PALE = 3, 4, 10, 12
+"""Columns of :meth:`Evidence.features` that depend on colour."""
+RIDGE = 2e-5
+FOLDS = 4
+SEED = 0
+EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Examples:
+    """Candidates: features ``(n, k)``; label 1 or 0, weight and scenario ``(n,)`` each."""
+
+    features: FloatArray
+    labels: npt.NDArray[np.int64]
+    weights: FloatArray
+    groups: npt.NDArray[np.str_]
+
+
+def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> Examples:
+    """Run the tracker over a sequence and label every candidate that it weighs."""
+    features, labels = [], []
+    tracker: MetricTracker | None = None
+    astray = back = 0
+    samples = sequence.open().samples
+    if rate is not None:
+        samples = at_rate(samples, rate)
+    if camera is not None:
+        samples = with_intrinsics(samples, camera)
+    for sample in samples:
+        if tracker is None:
+            if sample.visible is not None:
+                tracker = MetricTracker(MetricParameters())
+                tracker.start(sample.frame, sample.visible)
+            continue
+        track = tracker.update(sample.frame)
+        truths = [box for box in (sample.visible, sample.body) if box is not None]
+        if sample.visible is None:
+            truths = []
+        if astray < ASTRAY:
+            for candidate, box in tracker.weighed():
+                overlap = max((box.iou(t) for t in truths), default=0.0)
+                if not WRONG <= overlap <= RIGHT:
+                    features.append(candidate.evidence.features())
+                    labels.append(int(overlap > RIGHT))
+        if track.box is None:
+            continue
+        overlap = max((track.box.iou(t) for t in truths), default=0.0)
+        if overlap < WRONG:
+            astray, back = astray + 1, 0
+        elif overlap > RIGHT:
+            back += 1
+            if astray < ASTRAY or back >= BACK:
+                astray = 0
+    weight = REAL_WEIGHT if sequence.kind != 'sim' else 1.0
+    if weight == 1.0 and rate is not None and rate < SPARSE_HZ:
+        weight = SPARSE_WEIGHT
+    count = len(labels)
+    return Examples(
+        np.array(features).reshape(count, len(WEIGHTS)),
+        np.array(labels, np.int64),
+        np.full(count, weight),
+        np.full(count, sequence.scenario),
+    )
+
+
+def joined(parts: list[Examples]) -> Examples:
+    """All examples in one.
+
+    Raises:
+        DatasetError: where there are no targets or nothing else among them.
+    """
+    whole = Examples(
+        np.concatenate([p.features for p in parts]),
+        np.concatenate([p.labels for p in parts]),
+        np.concatenate([p.weights for p in parts]),
+        np.concatenate([p.groups for p in parts]),
+    )
+    if len(np.unique(whole.labels)) < 2:
+        raise DatasetError('the runs met no targets, or nothing else: give more sequences')
+    return whole
+
+
+def with_other_colors(examples: Examples) -> Examples:
+    """The examples and, for each target, a thing of wholly other colours at its place.
+
+    It is hardly ever met, since mostly depth tells the two apart; but it must not pass.
+    """
+    rng = np.random.default_rng(SEED)
+    good = (examples.labels == 1) & (examples.features[:, PALE] < 0.1)
+    features = examples.features[good].copy()
+    pale = rng.uniform(*PALE_RANGE, len(features))
+    features[:, PALE] = pale
+    features[:, FAR] = np.maximum(0.0, pale - OTHER_COLORS)
+    features[:, AWAY_PALE] = pale * features[:, AWAY]
+    count = len(features)
+    return Examples(
+        np.concatenate((examples.features, features)),
+        np.concatenate((examples.labels, np.zeros(count, np.int64))),
+        np.concatenate((examples.weights, np.full(count, PALE_WEIGHT))),
+        np.concatenate((examples.groups, examples.groups[good])),
+    )
+
+
+def fit(examples: Examples) -> FloatArray:
+    """Weights of a logistic regression with a slight ridge, ``(k,)``."""
+    scale = np.abs(examples.features).max(axis=0) + 1e-9
+    inputs = examples.features / scale
+    sign = np.where(examples.labels == 1, 1.0, -1.0)
+    share = examples.weights / examples.weights.sum()
+
+    def loss(w: FloatArray) -> tuple[float, FloatArray]:
+        margin = sign * (inputs @ w)
+        slope = share * sign / (1 + np.exp(margin))
+        value = float((share * np.logaddexp(0, -margin)).sum() + RIDGE * (w[:-1] ** 2).sum())
+        gradient = -(inputs * slope[:, None]).sum(axis=0)
+        gradient[:-1] += 2 * RIDGE * w[:-1]
+        return value, gradient
+
+    found = minimize(
+        loss, np.zeros(inputs.shape[1]), jac=True, method='L-BFGS-B', options={'maxiter': 3000}
+    )
+    weights: FloatArray = found.x / scale
+    return weights
+
+
+def probabilities(features: FloatArray, weights: FloatArray) -> FloatArray:
+    """Of each example, ``(n,)``."""
+    result: FloatArray = 1.0 / (1.0 + np.exp(-np.clip(features @ weights, -30, 30)))
+    return result
+
+
+def left_out(examples: Examples) -> list[float]:
+    """Share decided rightly in each fold of scenarios by weights fitted to the others."""
+    names = np.unique(examples.groups)
+    shares = []
+    for first in range(min(FOLDS, len(names))):
+        test = np.isin(examples.groups, names[first::FOLDS])
+        if test.all():
+            continue
+        rest = Examples(
+            examples.features[~test],
+            examples.labels[~test],
+            examples.weights[~test],
+            examples.groups[~test],
+        )
+        weights = fit(with_other_colors(rest))
+        decided = probabilities(examples.features[test], weights) > 0.5
+        shares.append(float(np.mean(decided == (examples.labels[test] == 1))))
+    return shares
+
+
+def main() -> int:
+    """Print weights fitted to the data sets of the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split('\n')[0] if __doc__ else None)
+    parser.add_argument('dataset', nargs='+', help='as for rgbd-kcf evaluate: sim:all, a folder')
+    parser.add_argument('--seeds', type=int, nargs='+', default=[1], help='of simulated scenes')
+    parser.add_argument('--rates', default='30,15,10,5', help='frames per second of the scenes')
+    parser.add_argument('--fps', type=float, default=5.0, help='of image folders without stamps')
+    parser.add_argument('--intrinsics', help='FX,FY,CX,CY of recordings that do not have them')
+    args = parser.parse_args()
+    cv2.setNumThreads(1)
+    camera = Intrinsics(*map(float, args.intrinsics.split(','))) if args.intrinsics else None
+    rates = [float(rate) for rate in args.rates.split(',')]
+    parts = []
+    try:
+        options = DatasetOptions(fps=args.fps, seeds=tuple(args.seeds))
+        for name in args.dataset:
+            path: str | Path = name if name.startswith('sim:') else Path(name)
+            for sequence in open_dataset(str(path), options):
+                simulated = sequence.kind == 'sim'
+                for rate in rates if simulated else [None]:
+                    parts.append(meet(sequence, rate, None if simulated else camera))
+                    print(f'{sequence.name}: {len(parts[-1].labels)} candidates', file=sys.stderr)
+        examples = joined(parts)
+    except RgbdKcfError as error:
+        print(f'evidence_fit: error: {error}', file=sys.stderr)
+        return 2
+    weights = fit(with_other_colors(examples))
+    print('weights:', ', '.join(f'{w:.3f}' for w in weights))
+    for label, values in (('released', WEIGHTS), ('fitted', weights)):
+        chance = probabilities(examples.features, values)
+        share = np.mean((chance > 0.5) == (examples.labels == 1))
+        print(f'{label}: {100 * share:.1f} % of {len(chance)} candidates decided rightly')
+    print('scenarios left out:', ', '.join(f'{100 * s:.1f} %' for s in left_out(examples)))
+    chance = probabilities(examples.features, weights)
+    for low, high in itertools.pairwise(EDGES):
+        inside = (chance >= low) & (chance < high)
+        if inside.any():
+            right = 100 * np.mean(examples.labels[inside])
+            print(
+                f'probability {low:g} to {high:g}: {inside.sum()} candidates, {right:.0f} % right'
+            )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
