@@ -35,7 +35,7 @@ TEST = [
     'hypothesis',
     'psutil',
     'colcon-common-extensions',
-    'setuptools>=64,<80',  # colcon refuses later ones
+    'setuptools>=70.1,<80',  # builds wheels by itself; colcon refuses later ones
 ]
 LINT = [
     'ruff==0.17.5',

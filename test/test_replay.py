@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, VARIANTS
 
-pytestmark = [pytest.mark.ros, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(240)]
 
 
 @pytest.fixture(scope='module')

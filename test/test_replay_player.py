@@ -84,7 +84,7 @@ def test_pacer_wait_ticks_and_stops() -> None:
     threading.Timer(0.05, stop.set).start()
     began = time.monotonic()
     assert not pacer.wait(10_000 * MS, stop)
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0
 
 
 def test_answers_of_exact_pairs() -> None:
@@ -227,7 +227,7 @@ def test_stop_ends_a_player_that_waits() -> None:
     )
     began = time.monotonic()
     assert not player.play(recording(3), stop)
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0
 
 
 def test_prefetch_hands_over_items_then_the_error() -> None:

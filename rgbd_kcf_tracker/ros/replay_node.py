@@ -159,12 +159,14 @@ class ReplayNode(Node):
 
     def _play(self, source: ReplaySource, answers: Answers, stop: threading.Event) -> None:
         parameters = self.parameters
+        info = source.first_info() if parameters.lockstep else None
         player = Player(
             self._send,
             Pacer(0.0 if parameters.lockstep else parameters.rate),
             answers,
             lockstep=parameters.lockstep,
             answer_timeout_s=parameters.answer_timeout,
+            info=info,
             tick=self._tick,
             warn=self.get_logger().warning,
         )
@@ -172,7 +174,6 @@ class ReplayNode(Node):
             f'replaying {source.name}: {len(source)} messages, '
             + ', '.join(p.topic_name for p in self._publishers_by_topic.values())
         )
-        info = source.first_info() if parameters.lockstep else None
         if info is not None:
             # Drivers send it with every image; a recording may hold it after the images that a
             # tracker answers only with it.

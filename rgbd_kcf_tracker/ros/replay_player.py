@@ -20,6 +20,7 @@ ATTEMPTS = 3
 """How often images are sent in lock-step before their answer is given up."""
 
 
+FIRST_PERIOD_S = 0.2
 RECENT = 8
 """Images that are kept for sending again."""
 
@@ -45,6 +46,7 @@ class Player:
         answers: what the tracker must answer.
         lockstep: hold the next message back until nothing is left to answer.
         answer_timeout_s: see :class:`ReplayParameters`.
+        info: the camera's CameraInfo, which in lock-step goes ahead of the images.
         tick: told the recorded time while waiting and before each message.
         warn: told what a person should know.
     """
@@ -57,6 +59,7 @@ class Player:
         *,
         lockstep: bool = False,
         answer_timeout_s: float = 5.0,
+        info: Message | None = None,
         tick: Callable[[int], None] = lambda time_ns: None,
         warn: Callable[[str], None] = lambda text: None,
     ) -> None:
@@ -65,6 +68,7 @@ class Player:
         self._answers = answers
         self._lockstep = lockstep
         self._timeout_s = answer_timeout_s
+        self._info = info
         self._tick = tick
         self._warn = warn
         self._recent: deque[Message] = deque(maxlen=RECENT)
@@ -102,7 +106,7 @@ class Player:
         if message is not None and message.role in (Role.COLOR, Role.DEPTH):
             self._recent.append(message)
         for attempt in range(ATTEMPTS):
-            if self._answers.wait(self._timeout_s, stop):
+            if self._wait(stop):
                 return True
             if stop.is_set():
                 return False
@@ -114,6 +118,24 @@ class Player:
             f'{stamps[0] * 1e-9:.3f} s: going on without'
         )
         return True
+
+    def _wait(self, stop: threading.Event) -> bool:
+        """Wait for what is due, and until the first answer send what was sent again and again.
+
+        Of two sides that discover each other one is first. A tracker that does not yet know each
+        topic's publisher would start on a picture without its depth or intrinsics.
+        """
+        left = self._timeout_s
+        while not self._answers.latencies_s and left > 0:
+            if self._answers.wait(min(FIRST_PERIOD_S, left), stop):
+                return True
+            if stop.is_set():
+                return False
+            left -= FIRST_PERIOD_S
+            for message in (self._info, *self._recent):
+                if message is not None:
+                    self._send(message)
+        return self._answers.wait(max(left, 0.0), stop)
 
     def _repeat(self) -> None:
         """Send the last images again; a tracker drops those that it knows by their stamps."""

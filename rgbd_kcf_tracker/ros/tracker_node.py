@@ -221,6 +221,10 @@ class TrackerNode(LifecycleNode):
 
     def _on_color(self, message: Any) -> None:
         if self._intake is not None:
+            if not self._intake.depth_expected and self._inputs is not None:
+                # A camera that has just come up: what was so a second ago would cost its first
+                # images their depth.
+                self._intake.depth_expected = self._inputs.publishers()[DEPTH] > 0
             self._hand_over(self._intake.color(message, time.monotonic_ns()))
 
     def _on_depth(self, message: Any) -> None:
