@@ -42,7 +42,7 @@ SPARSE_HZ = 20.0
 PALE_WEIGHT = 0.01
 PALE_RANGE = (0.6, 0.95)
 """Weight and loss of likeness of the target's places with a thing of wholly other colours there."""
-PALE, FAR, AWAY, AWAY_PALE = 3, 4, 10, 12
+PALE, FAR = 3, 4
 """Columns of :meth:`Evidence.features` that depend on colour."""
 RIDGE = 2e-5
 FOLDS = 4
@@ -135,7 +135,6 @@ def with_other_colors(examples: Examples) -> Examples:
     pale = rng.uniform(*PALE_RANGE, len(features))
     features[:, PALE] = pale
     features[:, FAR] = np.maximum(0.0, pale - OTHER_COLORS)
-    features[:, AWAY_PALE] = pale * features[:, AWAY]
     count = len(features)
     return Examples(
         np.concatenate((examples.features, features)),
