@@ -61,9 +61,9 @@ $(VENV)/.installed: setup.py setup.cfg pyproject.toml constraints.txt | $(BIN)/p
 	@touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
-	$(INSTALL) --editable '.[ros,test]'
+	$(INSTALL) --quiet --editable '.[ros,test]'
 	@touch $@
 
 $(VENV)/.installed-lint: $(VENV)/.installed
-	$(INSTALL) --editable '.[ros,test,lint]' nox
-	@touch $@
+	$(INSTALL) --quiet --editable '.[ros,test,lint]' nox
+	@touch $(VENV)/.installed-test $@
