@@ -227,6 +227,25 @@ def test_worker_takes_the_newest_and_counts_the_others() -> None:
     assert dropped == 4
 
 
+def test_what_comes_at_once_does_not_displace_each_other() -> None:
+    done: list[int] = []
+    gate = threading.Event()
+
+    def work(item: int) -> None:
+        gate.wait(5)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail)
+    worker.submit(0)
+    time.sleep(0.1)  # item 0 is in work
+    assert worker.submit(1) == 0
+    assert worker.submit(2, 3, 4) == 1
+    gate.set()
+    time.sleep(0.2)
+    assert worker.stop()
+    assert done == [0, 2, 3, 4]
+
+
 def test_worker_takes_all_in_order_and_outlives_errors() -> None:
     done, errors = [], []
 

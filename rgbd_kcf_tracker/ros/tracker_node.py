@@ -250,8 +250,8 @@ class TrackerNode(LifecycleNode):
     def _hand_over(self, captures: list[Capture]) -> None:
         if self._worker is None or self._intake is None:
             return
-        for capture in captures:
-            self.statistics.count('dropped', self._worker.submit(capture))
+        if captures:
+            self.statistics.count('dropped', self._worker.submit(*captures))
         # The timer runs only while something waits.
         if self._intake.idle:
             self._poll_timer.cancel()

@@ -44,16 +44,20 @@ class Worker(Generic[T]):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def submit(self, item: T) -> int:
-        """Hand over an item without waiting; returns how many older ones had to make room."""
+    def submit(self, *items: T) -> int:
+        """Hand over items without waiting; returns how many older ones had to make room.
+
+        Items that come at once, because they waited for the same thing, do not displace each other.
+        """
         dropped = 0
         with self._condition:
             if self._stopping:
                 return 0
-            while len(self._items) >= self._keep:
+            keep = max(self._keep - len(items), 0)
+            while len(self._items) > keep:
                 self._items.popleft()
                 dropped += 1
-            self._items.append(item)
+            self._items.extend(items)
             self._condition.notify()
         return dropped
 
