@@ -175,9 +175,13 @@ def main(args: list[str] | None = None) -> int:
     for variant in options.variants:
         for size in options.sizes:
             print(f'{variant} at {size}, {options.seconds:g} s ...', file=sys.stderr)
-            results.append(
-                measure(variant, size, options.rate, options.seconds, not options.no_profile)
-            )
+            try:
+                results.append(
+                    measure(variant, size, options.rate, options.seconds, not options.no_profile)
+                )
+            except RuntimeError as error:
+                print(f'{variant} at {size}: {error}', file=sys.stderr)
+                return 2
     print(table(results))
     for result in results:
         print('\n' + histogram(result))
