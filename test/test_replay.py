@@ -70,10 +70,10 @@ def test_lockstep_gives_the_boxes_of_the_engine(bag: Path, tmp_path: Path, varia
 
 
 def test_at_camera_rate_with_a_live_tracker(bag: Path, tmp_path: Path) -> None:
-    """30 Hz, nothing held back: the tracker keeps up, and time on the wire is recorded time."""
+    """30 Hz, nothing held back: the tracker keeps up."""
     report = tmp_path / 'report.json'
     with (
-        rig.Listener(clock=True) as heard,
+        rig.Listener() as heard,
         rig.running_tracker(
             tmp_path, variant='kcf', init_box=rig.box_text(rig.first_box()), queue_policy='all'
         ),
@@ -91,20 +91,19 @@ def test_at_camera_rate_with_a_live_tracker(bag: Path, tmp_path: Path) -> None:
     boxes = [box_from_polygon(m.polygon.points) for m in heard.boxes]
     assert boxes[0] is not None
     assert boxes[0].iou(rig.first_box()) > 0.99
-    stamps = [f.frame.stamp_ns for f in rig.frames()]
-    assert len(heard.clock) > count
-    assert heard.clock == sorted(heard.clock)
-    assert stamps[0] <= heard.clock[0]
-    assert heard.clock[-1] <= stamps[-1]
 
 
 def test_pixels_and_stamps_arrive_as_recorded(bag: Path, tmp_path: Path) -> None:
-    with rig.Listener(images=True) as heard:
+    with rig.Listener(images=True, clock=True) as heard:
         status, output = rig.run_replay(tmp_path, bag=str(bag), rate=3.0)
         assert status == 0, output
         time.sleep(0.2)
     wanted = rig.frames()
     assert len(heard.colors) == len(heard.depths) == len(heard.infos) == len(wanted)
+    assert len(heard.clock) > len(wanted)
+    assert heard.clock == sorted(heard.clock)
+    assert wanted[0].frame.stamp_ns <= heard.clock[0]
+    assert heard.clock[-1] <= wanted[-1].frame.stamp_ns
     for made, color, depth, info in zip(
         wanted, heard.colors, heard.depths, heard.infos, strict=True
     ):
