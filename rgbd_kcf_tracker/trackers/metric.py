@@ -26,6 +26,8 @@ ATTEND = 1.0
 """Seconds after which the look of a target followed by its surface is learned again."""
 BLIND = 0.25
 """Share of the expected body without a reading from which depth says nothing of it."""
+SUREST_LOOK = 0.9
+"""Score of a box found by look at full response: on colour alone about nine of ten are right."""
 RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
 """Overlap of what the look finds with a surface, and for how long, to go over to the surface."""
@@ -164,4 +166,4 @@ class MetricTracker:
 
 def _score(look: Look) -> float:
     """Probability that a box found by look is right, from the response against its mean."""
-    return float(min(max(look.ratio, 0.0), 1.0))
+    return float(min(max(look.ratio, 0.0), SUREST_LOOK))
