@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.filters.evidence import Evidence, probability
 from rgbd_kcf_tracker.filters.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.filters.motion import MotionFilter
 from rgbd_kcf_tracker.filters.proposals import Expectation, gathered, propose
+from rgbd_kcf_tracker.filters.visible_box import visible_box
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
 
@@ -39,8 +40,6 @@ LEAN_WHOLE = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
-FOOT = 0.2
-"""Metres above the floor up to which a body is taken to stand on it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -344,45 +343,9 @@ class BySurface:
         other = self._bystanders.beside(slice(y0, y1), slice(x0, x1))
         self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
 
-    # -- the box ----------------------------------------------------------------------------------
-
     def box(self, scene: Scene, found: Candidate) -> Box:
-        """The box of a candidate's pixels, with what the sensor did not see of it added."""
-        seen = found.seen
-        rows, cols = seen.mask.shape
-        x0, x1 = float(seen.left), float(seen.left + cols)
-        bottom = float(seen.top + rows)
-        if scene.floor is not None and not seen.cut.bottom:
-            foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
-            if 0 < (foot - bottom) * seen.depth / scene.view.intrinsics.fy < FOOT:
-                bottom = foot
-        width = scene.view.shape[1]
-        if scene.rim.left > 2 and x0 <= scene.rim.left + 2:
-            x0 -= self._beyond_rim(scene, found, -1)
-        if scene.rim.right > 2 and x1 >= width - scene.rim.right - 2:
-            x1 += self._beyond_rim(scene, found, 1)
-        step = scene.view.step
-        return Box.from_corners(x0 * step, seen.top * step, x1 * step, bottom * step)
-
-    def _beyond_rim(self, scene: Scene, found: Candidate, way: int) -> int:
-        """Columns by which the body goes on where depth has ended but colour has not."""
-        seen, body = found.seen, self.body
-        most = max(body.width, PLACED_MIDDLE * body.height)
-        cols = seen.mask.shape[1]
-        limit = int(most * scene.view.intrinsics.fx / seen.depth) - cols + 2
-        if limit <= 0:
-            return 0
-        codes = scene.codes[seen.rows]
-        if way > 0:
-            codes = codes[:, seen.left + cols : seen.left + cols + limit]
-        else:
-            codes = codes[:, max(0, seen.left - limit) : seen.left][:, ::-1]
-        if codes.shape[1] == 0:
-            return 0
-        odds = body.odds_of(codes, seen, scene.view, float(found.placed.position[1]))
-        like = np.convolve((odds > 0).mean(axis=0), np.ones(3) / 3, 'same')
-        ends = np.flatnonzero(like < 0.25)
-        return int(ends[0]) if len(ends) else codes.shape[1]
+        """The box that a candidate would give, in pixels of the image."""
+        return visible_box(scene, self.body, found.seen, float(found.placed.position[1]))
 
 
 def _misfit(size: float, expected: float, cut: bool, known: bool) -> float:
