@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +20,11 @@ import pytest
 os.environ.setdefault('ROS_PYTHON_CHECK_FIELDS', '1')
 # Pictures are drawn into files only.
 os.environ.setdefault('MPLBACKEND', 'Agg')
+
+# A suite started in a shell's background inherits that Ctrl-C is ignored, and so would the programs
+# under test, which are to be interrupted by it. A handler of Python's own is not inherited.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 PROJECT = Path(__file__).resolve().parent.parent
 # Above 101 the ports of a domain fall into Linux's ephemeral range, until 215.
