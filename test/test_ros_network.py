@@ -141,6 +141,8 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
             *('-p', f'init_box:={first_box("qhd")}'),
             **variables,
         )
+        # The consumer must know the tracker before there is anything to miss.
+        assert consumer.stdout.readline() == 'listening\n'
         before = network.sent_bytes('camera')
         camera = network.start(
             'camera',

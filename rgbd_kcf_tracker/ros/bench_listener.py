@@ -3,7 +3,8 @@
 
 """A consumer of the tracker's boxes for the live measurements, as a process of its own.
 
-Prints one line of JSON when the boxes have stopped coming. Started by the measurements.
+Prints 'listening' once it hears the tracker, and one line of JSON when the boxes have stopped
+coming. Started by the measurements.
 """
 
 from __future__ import annotations
@@ -28,8 +29,13 @@ def main(args: list[str] | None = None) -> int:
     listener = Listener()
     end = time.monotonic() + options.timeout
     heard, last = 0, time.monotonic()
+    known = False
     while time.monotonic() < end and not (heard and time.monotonic() - last > SILENCE_S):
         listener.spin(0.2)
+        if listener.diagnostics and not known:
+            # Whoever starts the camera waits for this line: boxes sent before it may be missed.
+            known = True
+            print('listening', flush=True)
         if len(listener.arrivals) > heard:
             heard, last = len(listener.arrivals), time.monotonic()
     listener.close()
