@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.features.depth_view import DepthView
+from rgbd_kcf_tracker.geometry import Intrinsics
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,6 +36,12 @@ class Surfaces:
 
     def __len__(self) -> int:
         return len(self.pixels)
+
+    def areas(self, k: Intrinsics) -> npt.NDArray[np.float64]:
+        """Square metres of each surface as seen from a camera, ``(n,)``."""
+        z = self.depth.astype(np.float64)
+        result: npt.NDArray[np.float64] = self.pixels * z * z / (k.fx * k.fy)
+        return result
 
 
 def standing(

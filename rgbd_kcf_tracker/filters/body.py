@@ -183,10 +183,8 @@ class Body:
 
     # -- learning ---------------------------------------------------------------------------------
 
-    def learn_size(self, seen: Silhouette, dt: float | None) -> None:
+    def learn_size(self, seen: Silhouette, dt: float) -> None:
         """Follow the size of a silhouette of which nothing is cut off."""
-        if dt is None:
-            return
         grow, shrink = 1 - np.exp(-dt / GROW_TIME), 1 - np.exp(-dt / SHRINK_TIME)
 
         def eased(old: float, new: float) -> float:

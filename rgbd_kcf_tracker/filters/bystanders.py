@@ -193,5 +193,5 @@ def _facts(view: DepthView, surfaces: Surfaces, lab: npt.NDArray[np.uint8]) -> F
     for axis in range(3):
         sums = np.bincount(flat, weights=lab[:, :, axis].ravel(), minlength=count)
         facts[:, 3 + axis] = sums / pixels
-    facts[:, 6] = np.log(np.maximum(pixels * z * z / (k.fx * k.fy), 1e-6))
+    facts[:, 6] = np.log(np.maximum(surfaces.areas(k), 1e-6))
     return facts

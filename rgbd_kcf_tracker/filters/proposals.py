@@ -32,8 +32,6 @@ TOO_LARGE = 1.7
 """Area against the target's from which a surface is taken for the target and something else."""
 MIXED = 0.2
 """Share of known pixels from which likewise."""
-GATE = 3.0
-"""Standard deviations about the expected place in which surfaces are looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +66,7 @@ class Facts:
         z = surfaces.depth.astype(np.float64)
         boxes = surfaces.boxes
         return cls(
-            surfaces.pixels * z * z / (k.fx * k.fy),
+            surfaces.areas(k),
             (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
             (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
             boxes[:, 2] * z / k.fx,

@@ -36,7 +36,7 @@ SLOWING = np.array([1.0, 0.25, 1.0])
 GROWN, SHRUNK = 0.3, 0.35
 """Spread of the log size of a body about what is known of it."""
 PLACED_MIDDLE = 0.4
-LEAN_WHOLE = 0.6
+LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
@@ -158,7 +158,7 @@ class BySurface:
         self.motion.correct(placed.position, placed.sigma)
         self._remember(scene, seen)
         self.body.grow(seen)
-        if not seen.cut.any and placed.fraction > LEAN_WHOLE:
+        if not seen.cut.any and placed.fraction > LEARN_FRACTION:
             self.body.learn_colors(placed, dt)
             self._learn_around(scene, dt)
             self.body.learn_size(seen, dt)
@@ -322,13 +322,9 @@ class BySurface:
         near &= (boxes[:, 0] < cols.stop + beside) & (boxes[:, 1] < rows.stop)
         near &= boxes[:, 0] + boxes[:, 2] > cols.start - beside
         near &= boxes[:, 1] + boxes[:, 3] > rows.start
-        result: npt.NDArray[np.bool_] = near & (self.body.area * 1.7 > self._areas(scene))
-        return result
-
-    @staticmethod
-    def _areas(scene: Scene) -> FloatArray:
-        k, z = scene.view.intrinsics, scene.surfaces.depth.astype(np.float64)
-        result: FloatArray = scene.surfaces.pixels * z * z / (k.fx * k.fy)
+        result: npt.NDArray[np.bool_] = near & (
+            self.body.area * 1.7 > scene.surfaces.areas(scene.view.intrinsics)
+        )
         return result
 
     def _learn_around(self, scene: Scene, dt: float | None) -> None:
