@@ -18,7 +18,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.ros.cameras import camera_profile, load_cameras
+from rgbd_kcf_tracker.live.camera_profiles import camera_profile, load_cameras
 
 CONFIG = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config')
 ARGUMENTS = {

@@ -6,7 +6,8 @@
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.trackers import Track, Tracker, TrackState, create_tracker
+from rgbd_kcf_tracker.track import Track, Tracker, TrackState
+from rgbd_kcf_tracker.variants import create_tracker
 
 __version__ = '0.1.0'
 __all__ = [

@@ -591,7 +591,7 @@ import sys
 import dataclasses
 from bag_rig import make_frames
 from rgbd_kcf_tracker.recordings import BagWriter, KINECT2_QHD
-from rgbd_kcf_tracker.trackers import Track, TrackState
+from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.geometry import Box
 
 frames = make_frames(3)

@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
-from rgbd_kcf_tracker.trackers import VARIANTS
+from rgbd_kcf_tracker.variants import VARIANTS
 
 SQUARE = 40
 

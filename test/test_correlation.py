@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from rgbd_kcf_tracker.filters.correlation import (
+from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,

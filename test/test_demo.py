@@ -19,10 +19,10 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker import Box, Track, TrackState
+from rgbd_kcf_tracker.bench.demo_pictures import CELL_WIDTH, chosen, contact_sheet, thumbnail
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.ros import transport
-from rgbd_kcf_tracker.ros.demo_pictures import CELL_WIDTH, chosen, contact_sheet, thumbnail
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -36,7 +36,7 @@ def test_demo_leaves_what_it_promises(tmp_path: Path) -> None:
     environment = {**os.environ, 'HOME': str(home)}
     environment.pop('ROS_LOG_DIR', None)
     done = subprocess.run(
-        [sys.executable, '-m', 'rgbd_kcf_tracker.ros.demo', str(dest), '--seconds', '2',
+        [sys.executable, '-m', 'rgbd_kcf_tracker.bench.demo', str(dest), '--seconds', '2',
          '--size', '320x180', '--variant', 'kcf'],
         env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=150, check=False,
     )  # fmt: skip
@@ -74,7 +74,7 @@ def test_demo_leaves_what_it_promises(tmp_path: Path) -> None:
 def test_demo_names_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
     done = subprocess.run(
-        [sys.executable, '-m', 'rgbd_kcf_tracker.ros.demo', str(tmp_path / 'file' / 'demo')],
+        [sys.executable, '-m', 'rgbd_kcf_tracker.bench.demo', str(tmp_path / 'file' / 'demo')],
         capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert done.returncode == 1

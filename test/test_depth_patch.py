@@ -8,9 +8,9 @@ import numpy.typing as npt
 import pytest
 
 from rgbd_kcf_tracker import Box
-from rgbd_kcf_tracker.features.depth_patch import GRID, centre_patch
-from rgbd_kcf_tracker.filters.depth_patch import DepthDifference, DepthPatch, trim
-from rgbd_kcf_tracker.trackers.depth_aware import DepthParameters
+from rgbd_kcf_tracker.thesis.centre_patch import GRID, centre_patch
+from rgbd_kcf_tracker.thesis.depth_aware import DepthParameters
+from rgbd_kcf_tracker.thesis.depth_patch import DepthDifference, DepthPatch, trim
 
 Depth = npt.NDArray[np.float32]
 

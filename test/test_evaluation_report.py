@@ -28,7 +28,8 @@ from rgbd_kcf_tracker.evaluation.store import Truth
 from rgbd_kcf_tracker.evaluation.table import Table
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import Parameters, parameter
-from rgbd_kcf_tracker.trackers import VARIANTS, Track, TrackState, Variant
+from rgbd_kcf_tracker.track import Track, TrackState
+from rgbd_kcf_tracker.variants import VARIANTS, Variant
 
 TRUTH = Box(10, 10, 20, 20)
 AWAY = Box(200, 100, 20, 20)

@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, write_tracks
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.trackers import Track, TrackState
+from rgbd_kcf_tracker.track import Track, TrackState
 
 KCF = Contender('kcf', 'variant', 'kcf')
 

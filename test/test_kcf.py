@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from rgbd_kcf_tracker import Box, Frame, RgbdKcfError, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation import otb_reference
-from rgbd_kcf_tracker.features.window import cut, gray_window
-from rgbd_kcf_tracker.trackers.kcf import KcfParameters, WindowGeometry
+from rgbd_kcf_tracker.thesis.kcf import KcfParameters, WindowGeometry
+from rgbd_kcf_tracker.thesis.window import cut, gray_window
 
 
 def texture(height: int, width: int, seed: int, blur: float = 2.0) -> npt.NDArray[np.uint8]:

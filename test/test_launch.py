@@ -19,8 +19,8 @@ import pytest
 import yaml
 
 from rgbd_kcf_tracker.errors import ParameterError
-from rgbd_kcf_tracker.ros.cameras import camera_profile, load_cameras
-from rgbd_kcf_tracker.ros.settings import NodeParameters
+from rgbd_kcf_tracker.live.camera_profiles import camera_profile, load_cameras
+from rgbd_kcf_tracker.live.settings import NodeParameters
 
 PROJECT = Path(__file__).resolve().parent.parent
 CAMERAS = PROJECT / 'config' / 'cameras.yaml'
@@ -139,7 +139,7 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
     passed = {name for name, _ in included.named['launch_arguments']}
     assert passed <= set(tracker['ARGUMENTS'])
     (node,) = (e for e in entities if type(e).__name__ == 'Node')
-    from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
+    from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 
     names = set(ReplayParameters.__dataclass_fields__)
     assert set(node.named['parameters'][0]) <= names

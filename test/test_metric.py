@@ -15,9 +15,9 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.simulation import simulate
-from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
-from rgbd_kcf_tracker.trackers.track import Track
+from rgbd_kcf_tracker.track import Track
 
 SIZE = (480, 270)
 XTION = Intrinsics(534.29, 534.75, 309.57, 243.07)

@@ -12,7 +12,16 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
-from rgbd_kcf_tracker.features.color_bands import (
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
+from rgbd_kcf_tracker.metric.identity.body import Body
+from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
+from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
+from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
+from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures, resampled
+from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
+from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
     CODES,
     band_histograms,
@@ -20,20 +29,11 @@ from rgbd_kcf_tracker.features.color_bands import (
     color_codes,
     view_lab,
 )
-from rgbd_kcf_tracker.features.depth_view import DepthView
-from rgbd_kcf_tracker.features.floor import FloorFinder
-from rgbd_kcf_tracker.features.patch import PatchFeatures, resampled
-from rgbd_kcf_tracker.features.scene import SceneReader
-from rgbd_kcf_tracker.features.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.features.surfaces import cut
-from rgbd_kcf_tracker.filters.body import Body
-from rgbd_kcf_tracker.filters.bystanders import Bystanders
-from rgbd_kcf_tracker.filters.color_posterior import ColorPosterior, rgb_codes
-from rgbd_kcf_tracker.filters.evidence import WEIGHTS, Evidence, probability
-from rgbd_kcf_tracker.filters.hidden_cloud import HiddenCloud
-from rgbd_kcf_tracker.filters.masked_filter import MaskedFilter
-from rgbd_kcf_tracker.filters.motion import MotionFilter
-from rgbd_kcf_tracker.filters.scale_filter import ScaleFilter
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.surfaces import cut
 
 CAMERA = Intrinsics(200, 200, 120, 80)
 
@@ -363,7 +363,7 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
 
 
 def test_surface_of_a_box_is_the_one_it_is_drawn_about():
-    from rgbd_kcf_tracker.trackers.by_surface import BySurface
+    from rgbd_kcf_tracker.metric.by_surface import BySurface
 
     scene = SceneReader(240, 0.04, 0.03, 0.0, 0).read(lookalikes(100, 300))
     seen = BySurface.surface_of(scene, Box(100, 80, 60, 170))

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker import Box
-from rgbd_kcf_tracker.features.color_histogram import (
+from rgbd_kcf_tracker.thesis.color_histogram import (
     ColorHistogram,
     bhattacharyya_distance,
     epanechnikov,
 )
-from rgbd_kcf_tracker.filters.particle_filter import (
+from rgbd_kcf_tracker.thesis.particle_filter import (
     ALPHA,
     HEIGHT,
     VX,

@@ -15,8 +15,8 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.errors import BoxError
-from rgbd_kcf_tracker.features.people import PersonFinder
-from rgbd_kcf_tracker.features.pointing import surface_at
+from rgbd_kcf_tracker.metric.perceive.people import PersonFinder
+from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.simulation import simulate
 
 CAMERA = Intrinsics(540, 540, 320, 240)

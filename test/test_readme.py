@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rgbd_kcf_tracker.trackers import VARIANTS
+from rgbd_kcf_tracker.variants import VARIANTS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / 'README.md', ROOT / 'QUALITY_DECLARATION.md', *sorted((ROOT / 'docs').glob('*.md'))]

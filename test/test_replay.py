@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
 from rgbd_kcf_tracker.recordings.images import decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
-from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, VARIANTS
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(240)]
 

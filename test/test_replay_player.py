@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import pytest
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.ros.prefetch import prefetched
-from rgbd_kcf_tracker.ros.replay_lockstep import Answers
-from rgbd_kcf_tracker.ros.replay_message import Message, Role
-from rgbd_kcf_tracker.ros.replay_pacing import Pacer
-from rgbd_kcf_tracker.ros.replay_player import Player
+from rgbd_kcf_tracker.live.prefetch import prefetched
+from rgbd_kcf_tracker.live.replay_lockstep import Answers
+from rgbd_kcf_tracker.live.replay_message import Message, Role
+from rgbd_kcf_tracker.live.replay_pacing import Pacer
+from rgbd_kcf_tracker.live.replay_player import Player
 
 MS = 1_000_000
 

@@ -13,9 +13,9 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import ParameterError
-from rgbd_kcf_tracker.trackers import default_parameters
-from rgbd_kcf_tracker.trackers.rgbd import RgbdParameters
-from rgbd_kcf_tracker.trackers.rgbd_pf import RgbdPfParameters
+from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters
+from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfParameters
+from rgbd_kcf_tracker.variants import default_parameters
 
 VARIANTS = ['rgbd', 'rgbd_pf']
 WIDTH, HEIGHT = 480, 270

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
-from rgbd_kcf_tracker.ros import benchmark, soak
+from rgbd_kcf_tracker.bench import live, soak
 
 pytestmark = pytest.mark.ros
 
@@ -21,14 +21,14 @@ def test_benchmark_measures_a_live_camera(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / 'live.json'
-    benchmark.main(['--sizes', 'qhd', '--seconds', '3', '--output', str(output)])
+    live.main(['--sizes', 'qhd', '--seconds', '3', '--output', str(output)])
     (result,) = json.loads(output.read_text())
     assert result['sent'] == 120
     assert result['received'] >= 115
     assert result['processed'] + result['dropped'] == result['received']
     assert result['boxes'] >= 0.9 * result['processed'] > 0
     assert 0 < result['median_ms'] <= result['p95_ms'] <= result['p99_ms'] <= result['max_ms']
-    assert sum(result['histogram']) == result['processed'] - benchmark.WARM_UP
+    assert sum(result['histogram']) == result['processed'] - live.WARM_UP
     assert 0 < result['cpu_cores'] < 2
     printed = capsys.readouterr().out
     assert '| qhd 960x540 | 30 | 120 |' in printed

@@ -30,7 +30,7 @@ from ros_rig import FRAME_ID, HEIGHT, WIDTH, Rig, running_node, scene, stamp_of
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_srvs.srv import Trigger
 
-from rgbd_kcf_tracker.ros.bench_rig import resident_mb
+from rgbd_kcf_tracker.bench.rig import resident_mb
 from rgbd_kcf_tracker.ros.messages import image_message, stamp_to_ns
 
 pytestmark = pytest.mark.ros

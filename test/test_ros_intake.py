@@ -15,13 +15,13 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
-from rgbd_kcf_tracker.ros.intake import Intake
-from rgbd_kcf_tracker.ros.processor import Camera
-from rgbd_kcf_tracker.ros.session import Session
-from rgbd_kcf_tracker.ros.statistics import Statistics
-from rgbd_kcf_tracker.ros.timeline import Timeline
-from rgbd_kcf_tracker.ros.worker import Worker
-from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, default_parameters
+from rgbd_kcf_tracker.live.intake import Intake
+from rgbd_kcf_tracker.live.processor import Camera
+from rgbd_kcf_tracker.live.session import Session
+from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.timeline import Timeline
+from rgbd_kcf_tracker.live.worker import Worker
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 MS = 1_000_000
 BASE = 1_700_000_000 * 1000 * MS

@@ -24,9 +24,9 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_rig import Rig, overrides, running_node, scene, tracker_process
 
-from rgbd_kcf_tracker.ros.bench_rig import resident_mb
-from rgbd_kcf_tracker.ros.generated import outdated
-from rgbd_kcf_tracker.ros.settings import READ_ONLY, all_parameters
+from rgbd_kcf_tracker.bench.generated import outdated
+from rgbd_kcf_tracker.bench.rig import resident_mb
+from rgbd_kcf_tracker.live.settings import READ_ONLY, all_parameters
 from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
 
 pytestmark = pytest.mark.ros
@@ -213,7 +213,7 @@ def test_bad_overrides_leave_defaults_and_a_message(rig: Rig) -> None:
 
 
 def test_generated_files_are_up_to_date() -> None:
-    assert outdated(PROJECT) == [], 'run python -m rgbd_kcf_tracker.ros.generated'
+    assert outdated(PROJECT) == [], 'run python -m rgbd_kcf_tracker.bench.generated'
 
 
 def test_shipped_file_of_parameters_is_taken(rig: Rig, tmp_path: Path) -> None:

@@ -22,9 +22,12 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
+from rgbd_kcf_tracker.live.annotate import annotated
+from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor
+from rgbd_kcf_tracker.live.session import Session
+from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_from_info
-from rgbd_kcf_tracker.ros.annotate import annotated
 from rgbd_kcf_tracker.ros.messages import (
     box_from_roi,
     detections_from_track,
@@ -36,10 +39,7 @@ from rgbd_kcf_tracker.ros.messages import (
     stamp_from_ns,
     stamp_to_ns,
 )
-from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
-from rgbd_kcf_tracker.ros.session import Session
-from rgbd_kcf_tracker.ros.statistics import Statistics
-from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, default_parameters
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 many = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 uint32 = st.integers(0, 2**32 - 1)

@@ -23,9 +23,9 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
-from rgbd_kcf_tracker.ros.bench_camera import NAMESPACE
-from rgbd_kcf_tracker.ros.bench_rig import environment
-from rgbd_kcf_tracker.ros.benchmark import first_box
+from rgbd_kcf_tracker.bench.camera import NAMESPACE
+from rgbd_kcf_tracker.bench.live import first_box
+from rgbd_kcf_tracker.bench.rig import environment
 
 pytestmark = pytest.mark.ros
 
@@ -131,9 +131,7 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
         )
     processes = []
     try:
-        consumer = network.start(
-            'consumer', 'rgbd_kcf_tracker.ros.bench_listener', '--timeout', '60'
-        )
+        consumer = network.start('consumer', 'rgbd_kcf_tracker.bench.listener', '--timeout', '60')
         tracker = network.start(
             'tracker',
             'rgbd_kcf_tracker.ros.tracker_main',
@@ -146,7 +144,7 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
         before = network.sent_bytes('camera')
         camera = network.start(
             'camera',
-            'rgbd_kcf_tracker.ros.bench_camera',
+            'rgbd_kcf_tracker.bench.camera',
             *('--size', 'qhd', '--count', str(count), '--rate', '15'),
             *(['--compressed'] if compressed else []),
         )

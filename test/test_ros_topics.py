@@ -24,7 +24,7 @@ from visualization_msgs.msg import Marker
 from rgbd_kcf_tracker.recordings.images import decode_color
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
 from rgbd_kcf_tracker.simulation import simulate
-from rgbd_kcf_tracker.trackers import VARIANTS
+from rgbd_kcf_tracker.variants import VARIANTS
 
 pytestmark = pytest.mark.ros
 

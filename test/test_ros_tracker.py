@@ -34,7 +34,7 @@ from rgbd_kcf_tracker import Frame, Intrinsics, create_tracker
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.images import metres_from_mm
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
-from rgbd_kcf_tracker.trackers import VARIANTS
+from rgbd_kcf_tracker.variants import VARIANTS
 
 pytestmark = pytest.mark.ros
 

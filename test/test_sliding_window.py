@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker.features.hog import fhog
-from rgbd_kcf_tracker.filters.correlation import (
+from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,
     gaussian_labels,
 )
-from rgbd_kcf_tracker.filters.sliding_window import (
+from rgbd_kcf_tracker.thesis.sliding_window import (
     search_span,
     step_in_cells,
     window_starts,

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from rgbd_kcf_tracker.parameters import describe
-from rgbd_kcf_tracker.trackers.rgbd import RgbdParameters
-from rgbd_kcf_tracker.trackers.rgbd_pf import RgbdPfParameters
+from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters
+from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfParameters
 
 PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'thesis.md'
 

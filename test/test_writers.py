@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.recordings import (
     open_recording,
 )
 from rgbd_kcf_tracker.recordings.encoding import millimetres
-from rgbd_kcf_tracker.trackers import Track, TrackState
+from rgbd_kcf_tracker.track import Track, TrackState
 
 SEEN = Track(Box(10.25, 8.5, 20, 30.125), TrackState.TRACKING, 0.875, 2.5, (0.1, -0.2, 2.5))
 HIDDEN = Track(None, TrackState.OCCLUDED, 0.0, 2.5)

@@ -116,7 +116,7 @@ def _size(text: str) -> tuple[int, int, int]:
 
 
 def _contenders(names: str | None, variant: Callable[[str], Contender]) -> list[Contender]:
-    from rgbd_kcf_tracker.trackers import VARIANTS
+    from rgbd_kcf_tracker.variants import VARIANTS
 
     if names is not None:
         return [variant(name.strip()) for name in names.split(',')]

@@ -193,7 +193,7 @@ def _run(
 
 def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
     from rgbd_kcf_tracker.evaluation import contenders
-    from rgbd_kcf_tracker.trackers import VARIANTS
+    from rgbd_kcf_tracker.variants import VARIANTS
 
     if args.variants is not None:
         names = _words(args.variants)
@@ -221,7 +221,7 @@ def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
 def _overrides(items: Sequence[str], variants: Sequence[str]) -> dict[str, dict[str, str]]:
     """Parameters per variant; a key without a variant is for all that have it."""
     from rgbd_kcf_tracker.parameters import describe
-    from rgbd_kcf_tracker.trackers import VARIANTS
+    from rgbd_kcf_tracker.variants import VARIANTS
 
     known = {
         name: {info.name for info in describe(VARIANTS[name].parameters)}

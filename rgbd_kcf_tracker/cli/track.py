@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.frame import Frame
     from rgbd_kcf_tracker.geometry import Box
     from rgbd_kcf_tracker.recordings import Recording
-    from rgbd_kcf_tracker.trackers import Track, Tracker
+    from rgbd_kcf_tracker.track import Track, Tracker
 
 NAME = 'track'
 HELP = 'follow one target through a recording and write where it is'
@@ -71,7 +71,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Track, write, and print a summary."""
     from rgbd_kcf_tracker.recordings import open_recording
-    from rgbd_kcf_tracker.trackers.track import require_inside
+    from rgbd_kcf_tracker.track import require_inside
 
     tracker, variant = _make_tracker(args)
     given = None if args.init is None else parse_box(args.init)
@@ -168,7 +168,7 @@ class _Sinks:
 
 def _make_tracker(args: argparse.Namespace) -> tuple[Tracker, str]:
     from rgbd_kcf_tracker.parameters import with_overrides
-    from rgbd_kcf_tracker.trackers import DEFAULT_VARIANT, create_tracker, default_parameters
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters
 
     variant = args.variant or DEFAULT_VARIANT
     parameters = with_overrides(default_parameters(variant), parse_assignments(args.param))

@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.textfiles import read_lines
-from rgbd_kcf_tracker.trackers import Track, TrackState
+from rgbd_kcf_tracker.track import Track, TrackState
 
 _SUFFIXES = ('.csv', '.txt')
 

@@ -18,15 +18,8 @@ from rgbd_kcf_tracker.evaluation.store import slug
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import describe, with_overrides
-from rgbd_kcf_tracker.trackers import (
-    VARIANTS,
-    Track,
-    Tracker,
-    TrackState,
-    create_tracker,
-    default_parameters,
-)
-from rgbd_kcf_tracker.trackers.track import require_inside
+from rgbd_kcf_tracker.track import Track, Tracker, TrackState, require_inside
+from rgbd_kcf_tracker.variants import VARIANTS, create_tracker, default_parameters
 
 OPENCV_PREFIX = 'opencv:'
 OPENCV_TRACKERS = {'kcf': 'TrackerKCF', 'csrt': 'TrackerCSRT', 'mil': 'TrackerMIL'}

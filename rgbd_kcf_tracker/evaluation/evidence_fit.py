@@ -6,7 +6,7 @@
 ``python -m rgbd_kcf_tracker.evaluation.evidence_fit DATASET... [--rates 30,15,10,5]`` runs the
 tracker, labels each candidate by its overlap with the truth, and prints the weights, how often they
 decide rightly on scenarios that were left out of the fit, and how well their probabilities are
-calibrated. What is printed goes into ``filters/evidence.py``.
+calibrated. What is printed goes into ``metric/decide/evidence.py``.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from scipy.optimize import minimize
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import at_rate, with_intrinsics
-from rgbd_kcf_tracker.filters.evidence import OTHER_COLORS, WEIGHTS
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.trackers.metric import MetricTracker
-from rgbd_kcf_tracker.trackers.metric_parameters import MetricParameters
+from rgbd_kcf_tracker.metric.decide.evidence import OTHER_COLORS, WEIGHTS
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.tracker import MetricTracker
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -37,7 +37,10 @@ from rgbd_kcf_tracker.evaluation.store import (
 )
 from rgbd_kcf_tracker.geometry import Intrinsics
 
-_CODE = ('geometry.py', 'frame.py', 'features', 'filters', 'trackers', 'simulation', 'recordings')
+_CODE = (
+    'geometry.py', 'frame.py', 'track.py', 'parameters.py', 'variants.py',
+    'features', 'thesis', 'metric', 'simulation', 'recordings',
+)  # fmt: skip
 
 
 @cache

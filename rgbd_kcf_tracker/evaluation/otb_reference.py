@@ -24,7 +24,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.trackers import create_tracker
+from rgbd_kcf_tracker.variants import create_tracker
 
 REFERENCE = 'KCF_GaussHog'
 PIXELS = 20.0

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.evaluation.metrics import vot
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.trackers import Track, Tracker, TrackState
+from rgbd_kcf_tracker.track import Track, Tracker, TrackState
 
 THUMBNAIL_WIDTH = 320
 THUMBNAILS = 24

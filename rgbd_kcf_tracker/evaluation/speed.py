@@ -22,7 +22,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.trackers import Tracker
+from rgbd_kcf_tracker.track import Tracker
 
 RATE = 30.0
 WALL, FIGURE, BOARD = 4.0, 2.5, 1.5

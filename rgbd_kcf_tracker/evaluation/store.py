@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import TrackCsvWriter
 from rgbd_kcf_tracker.recordings.results import HEADER
-from rgbd_kcf_tracker.trackers import Track
+from rgbd_kcf_tracker.track import Track
 
 TRUTH_HEADER = (
     'frame', 'stamp_ns', 'x', 'y', 'width', 'height',

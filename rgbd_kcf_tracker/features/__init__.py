@@ -1,4 +1,4 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What one frame shows."""
+"""Pure functions of arrays that more than one engine uses."""

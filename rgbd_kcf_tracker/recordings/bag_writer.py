@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.recordings.encoding import (
 )
 from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, types
 from rgbd_kcf_tracker.recordings.overlay import draw_track
-from rgbd_kcf_tracker.trackers.track import Track
+from rgbd_kcf_tracker.track import Track
 
 TRUTH_VISIBLE, TRUTH_BODY = '/groundtruth/visible', '/groundtruth/body'
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.trackers.track import Track, TrackState
+from rgbd_kcf_tracker.track import Track, TrackState
 
 STATE_COLORS: dict[TrackState, tuple[int, int, int]] = {
     TrackState.IDLE: (170, 170, 170),

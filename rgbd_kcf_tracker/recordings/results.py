@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import TextIO
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.trackers.track import Track
+from rgbd_kcf_tracker.track import Track
 
 HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.mcap_writer import types
-from rgbd_kcf_tracker.trackers.track import Track
+from rgbd_kcf_tracker.track import Track
 
 _MARKER_LIFETIME_NS = 500_000_000
 

@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.results import cannot_write, prepare_output
-from rgbd_kcf_tracker.trackers.track import Track
+from rgbd_kcf_tracker.track import Track
 
 _SMALLEST_WIDTH = 640
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from rgbd_kcf_tracker.ros.statistics import Snapshot
-from rgbd_kcf_tracker.trackers import TrackState
+from rgbd_kcf_tracker.live.statistics import Snapshot
+from rgbd_kcf_tracker.track import TrackState
 
 RECENT_ERROR_S = 5.0
 ALARMING_SHARE = 0.1

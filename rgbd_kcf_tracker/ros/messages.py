@@ -24,7 +24,7 @@ from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker.errors import BoxError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.trackers import Track
+from rgbd_kcf_tracker.track import Track
 
 NANOSECONDS = 1_000_000_000
 

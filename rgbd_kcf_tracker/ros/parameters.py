@@ -24,9 +24,9 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.live.settings import READ_ONLY, NodeParameters, all_parameters, parse_box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, Scalar, checked, describe
-from rgbd_kcf_tracker.ros.settings import READ_ONLY, NodeParameters, all_parameters, parse_box
-from rgbd_kcf_tracker.trackers import VARIANTS
+from rgbd_kcf_tracker.variants import VARIANTS
 
 ROS_NAMES = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 """Parameters that rclpy itself declares: an override of these is none of ours."""

@@ -24,7 +24,7 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from rgbd_kcf_tracker.ros.memory import keep_large_blocks
+from rgbd_kcf_tracker.live.memory import keep_large_blocks
 
 __all__ = ['keep_large_blocks', 'run', 'spin']
 

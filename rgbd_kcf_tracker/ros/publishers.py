@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.ros.annotate import annotated
+from rgbd_kcf_tracker.live.annotate import annotated
 from rgbd_kcf_tracker.ros.messages import (
     detections_from_track,
     image_message,
@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.ros.messages import (
     position_from_track,
     roi_from_box,
 )
-from rgbd_kcf_tracker.trackers import Track
+from rgbd_kcf_tracker.track import Track
 
 RESULT_DEPTH = 100
 """History of the result topics: three seconds at 30 Hz for a consumer that pauses."""

@@ -12,7 +12,7 @@ import threading
 from types import FrameType
 from typing import Any
 
-from rgbd_kcf_tracker.ros.memory import keep_large_blocks
+from rgbd_kcf_tracker.live.memory import keep_large_blocks
 
 
 def main(args: list[str] | None = None) -> int:

@@ -22,15 +22,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.live.replay_lockstep import Answers
+from rgbd_kcf_tracker.live.replay_message import Message
+from rgbd_kcf_tracker.live.replay_pacing import Pacer
+from rgbd_kcf_tracker.live.replay_player import Player
+from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
+from rgbd_kcf_tracker.live.replay_source import ReplaySource
 from rgbd_kcf_tracker.parameters import checked, describe
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
 from rgbd_kcf_tracker.ros.parameters import ROS_NAMES, descriptor
-from rgbd_kcf_tracker.ros.replay_lockstep import Answers
-from rgbd_kcf_tracker.ros.replay_message import Message
-from rgbd_kcf_tracker.ros.replay_pacing import Pacer
-from rgbd_kcf_tracker.ros.replay_player import Player
-from rgbd_kcf_tracker.ros.replay_settings import ReplayParameters
-from rgbd_kcf_tracker.ros.replay_source import ReplaySource
 
 SETTLE_S = 0.3
 """From the moment that both sides know of each other to the first image: discovery is one-sided."""

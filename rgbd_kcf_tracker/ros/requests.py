@@ -17,13 +17,13 @@ from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.processor import Processor
+from rgbd_kcf_tracker.live.session import Choice
+from rgbd_kcf_tracker.live.settings import RESTART, NodeParameters, parse_box
 from rgbd_kcf_tracker.ros.messages import box_from_roi
-from rgbd_kcf_tracker.ros.processor import Processor
-from rgbd_kcf_tracker.ros.session import Choice
-from rgbd_kcf_tracker.ros.settings import RESTART, NodeParameters, parse_box
 
 if TYPE_CHECKING:
-    from rgbd_kcf_tracker.ros.auto_init import AutoInit
+    from rgbd_kcf_tracker.live.auto_init import AutoInit
 
 
 class Requests:
@@ -58,7 +58,7 @@ class Requests:
 
     def init_point(self, message: PointStamped) -> None:
         """``~/init_point``: a pixel of the newest image."""
-        from rgbd_kcf_tracker.features.pointing import surface_at
+        from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 
         u, v = float(message.point.x), float(message.point.y)
         self._choose(lambda frame: surface_at(frame, u, v))
@@ -79,7 +79,7 @@ class Requests:
             settings = self._settings()
             auto: AutoInit | None = None
             if settings.auto_init:
-                from rgbd_kcf_tracker.ros.auto_init import AutoInit
+                from rgbd_kcf_tracker.live.auto_init import AutoInit
 
                 auto = AutoInit(settings)
                 if settings.auto_init_confirm and not auto.confirms:

@@ -14,7 +14,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 
-from rgbd_kcf_tracker.ros.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
+from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
 
 COLOR, DEPTH, CAMERA_INFO = 'color/image', 'depth/image', 'color/camera_info'
 REQUEST_DEPTH = 10

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from rgbd_kcf_tracker.ros.memory import keep_large_blocks
+from rgbd_kcf_tracker.live.memory import keep_large_blocks
 from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
 

@@ -3,8 +3,8 @@
 
 """The tracker as a managed node: wiring only, the work is done elsewhere.
 
-Callbacks store (:mod:`~rgbd_kcf_tracker.ros.intake`); one worker thread decodes, tracks and
-publishes (:mod:`~rgbd_kcf_tracker.ros.processor`). Unconfigured the node only reports diagnostics;
+Callbacks store (:mod:`~rgbd_kcf_tracker.live.intake`); one worker thread decodes, tracks and
+publishes (:mod:`~rgbd_kcf_tracker.live.processor`). Unconfigured the node only reports diagnostics;
 inactive it holds tracker and topics; active it also listens.
 """
 
@@ -23,19 +23,20 @@ from sensor_msgs.msg import CameraInfo
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.live.intake import Intake
+from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor
+from rgbd_kcf_tracker.live.session import Session, warm_up
+from rgbd_kcf_tracker.live.settings import ALL, NodeParameters
+from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
-from rgbd_kcf_tracker.ros.intake import Intake
 from rgbd_kcf_tracker.ros.parameters import ParameterServer
-from rgbd_kcf_tracker.ros.processor import Camera, Capture, Processor
 from rgbd_kcf_tracker.ros.publishers import TrackPublishers
 from rgbd_kcf_tracker.ros.requests import Requests
-from rgbd_kcf_tracker.ros.session import Session, warm_up
-from rgbd_kcf_tracker.ros.settings import ALL, NodeParameters
-from rgbd_kcf_tracker.ros.statistics import Statistics
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
-from rgbd_kcf_tracker.ros.worker import Worker
-from rgbd_kcf_tracker.trackers import VARIANTS, TrackState
+from rgbd_kcf_tracker.track import TrackState
+from rgbd_kcf_tracker.variants import VARIANTS
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 POLL_PERIOD_S = 0.025

@@ -11,14 +11,28 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
-from rgbd_kcf_tracker.ros.bench_rig import PROFILE_VARIABLE, profile_path
-
+PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 SHM = Path('/dev/shm')
 _MEGABYTE = 1 << 20
 _LARGEST, _SMALLEST = 32 * _MEGABYTE, 4 * _MEGABYTE
+
+
+def profile_path() -> Path | None:
+    """The Fast DDS profile for images, in an installation or in the checkout."""
+    with suppress(Exception):
+        from ament_index_python.packages import get_package_share_directory
+
+        installed = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config', 'fastdds.xml')
+        if installed.is_file():
+            return installed
+    prefix = Path(sys.prefix, 'share', 'rgbd_kcf_tracker', 'config', 'fastdds.xml')
+    checkout = Path(__file__).resolve().parents[2] / 'config' / 'fastdds.xml'
+    return next((path for path in (checkout, prefix) if path.is_file()), None)
 
 
 def segment_size(free: int) -> int:

@@ -1,0 +1,39 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Choosing the target without being told: the nearest person, looked for a few times a second."""
+
+from __future__ import annotations
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.metric.perceive.people import PersonFinder
+
+PERIOD_NS = 200_000_000
+
+
+class AutoInit:
+    """A choice (see :mod:`~rgbd_kcf_tracker.live.session`) that costs nothing most of the time.
+
+    Args:
+        settings: the node's parameters ``auto_init_*``.
+    """
+
+    def __init__(self, settings: NodeParameters) -> None:
+        self._finder = PersonFinder(
+            settings.auto_init_near, settings.auto_init_far, settings.auto_init_confirm
+        )
+        self._looked: int | None = None
+
+    @property
+    def confirms(self) -> bool:
+        """Whether the people detector is asked; not every OpenCV has one."""
+        return self._finder.confirms
+
+    def __call__(self, frame: Frame) -> Box | None:
+        """The nearest person, if there is one and it is time to look again."""
+        if self._looked is not None and 0 <= frame.stamp_ns - self._looked < PERIOD_NS:
+            return None
+        self._looked = frame.stamp_ns
+        return self._finder.nearest(frame)

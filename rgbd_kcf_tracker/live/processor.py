@@ -1,0 +1,218 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""From a pair of messages to published results: what the worker's thread does for each pair.
+
+A message is whatever has the fields of its type; no ROS is needed to make one.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
+from rgbd_kcf_tracker.live.settings import RAW
+from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.timeline import Moment, Timeline
+from rgbd_kcf_tracker.recordings.images import (
+    ColorImage,
+    DepthImage,
+    decode_color,
+    decode_compressed_color,
+    decode_compressed_depth,
+    decode_depth,
+)
+from rgbd_kcf_tracker.recordings.messages import stamp_of
+from rgbd_kcf_tracker.track import Track, TrackState
+from rgbd_kcf_tracker.variants import VARIANTS
+
+
+class Camera(NamedTuple):
+    """What camera_info says: intrinsics, and the image size they are for (zeros: any)."""
+
+    intrinsics: Intrinsics
+    width: int
+    height: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Capture:
+    """A colour message, its depth message if it has one, and when the pair was complete.
+
+    Attributes:
+        color: ``sensor_msgs/Image`` or ``CompressedImage``.
+        depth: likewise, or None.
+        camera: as known at that time, or None.
+        arrival_ns: on the monotonic clock.
+    """
+
+    color: Any
+    depth: Any | None
+    camera: Camera | None
+    arrival_ns: int
+
+
+class Publishers(Protocol):
+    """Where the results of a frame go; the node's are the topics."""
+
+    @property
+    def image_wanted(self) -> bool:
+        """Whether somebody looks at the annotated image."""
+        ...
+
+    def publish(self, header: Any, track: Track, size: tuple[int, int] | None) -> None:
+        """The result of a frame with this header; ``size`` is None where it could not be read."""
+        ...
+
+    def publish_extras(
+        self, header: Any, track: Track, frame: Frame, intrinsics: Intrinsics | None
+    ) -> None:
+        """What is for people to look at, after the result is out."""
+        ...
+
+
+class Processor:
+    """Decodes what is needed, asks the session, publishes, counts.
+
+    Args:
+        session: the target.
+        publishers: where results go.
+        statistics: where counts go.
+        now_ns: the node's clock, for the age of a result.
+        fault: told of each fault by kind and in words.
+        color_transport, depth_transport: how the images are packed.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        publishers: Publishers,
+        statistics: Statistics,
+        now_ns: Callable[[], int],
+        fault: Callable[[str, str], None],
+        *,
+        color_transport: str = RAW,
+        depth_transport: str = RAW,
+    ) -> None:
+        self.session = session
+        self._publishers = publishers
+        self._statistics = statistics
+        self._now_ns = now_ns
+        self._fault = fault
+        self._timeline = Timeline()
+        self._last: tuple[Capture, int] | None = None
+        self._frame_id: str | None = None
+        self.on_restart: Callable[[], None] | None = None
+        self._decode_color: Callable[[Any], ColorImage] = (
+            decode_color if color_transport == RAW else decode_compressed_color
+        )
+        self._decode_depth: Callable[[Any], DepthImage] = (
+            decode_depth if depth_transport == RAW else decode_compressed_depth
+        )
+
+    def __call__(self, capture: Capture) -> None:
+        """Answer one pair: there is a result for every pair, whatever is wrong with it."""
+        header = capture.color.header
+        moment = self._timeline.advance(stamp_of(capture.color), capture.arrival_ns)
+        self._notice(header, moment)
+        session, image_wanted = self.session, self._publishers.image_wanted
+        frame: Frame | None = None
+        size: tuple[int, int] | None = None
+        track = IDLE
+        if session.needs_frame or image_wanted:
+            frame = self.frame(capture, moment.time_ns)
+            track = self._unseen()
+            if frame is not None:
+                size = frame.width, frame.height
+                try:
+                    track = session.process(frame)
+                except Exception as error:  # a bug in a tracker must not leave a pair unanswered
+                    self._fault(
+                        'internal_errors', f'internal error: {type(error).__name__}: {error}'
+                    )
+        self._publishers.publish(header, track, size)
+        latency = self._now_ns() - stamp_of(capture.color)
+        work = time.monotonic_ns() - capture.arrival_ns
+        self._statistics.processed(latency / 1e6, work / 1e6)
+        self._last = capture, moment.time_ns
+        if frame is not None:
+            self._publishers.publish_extras(header, track, frame, frame.intrinsics)
+
+    def _unseen(self) -> Track:
+        """The answer where nothing can be seen: no box, and the target is as it was."""
+        hidden = self.session.track.state is not TrackState.IDLE
+        return Track(None, TrackState.OCCLUDED) if hidden else IDLE
+
+    def choose(self, choice: Choice, oldest_s: float) -> None:
+        """Start on the newest image, or the next one where the newest is old or shows nothing."""
+        if self._last is not None:
+            capture, time_ns = self._last
+            if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
+                self.session.choose(choice)  # so that depth is decoded for it
+                frame = self.frame(capture, time_ns)
+                if frame is not None:
+                    self.session.start(frame, choice)
+                    self.session.choose(None)
+                    return
+        self.session.choose(choice)
+
+    def frame(self, capture: Capture, time_ns: int) -> Frame | None:
+        """The pair as a frame; without depth where that cannot be used; None without a picture."""
+        try:
+            color = self._decode_color(capture.color)
+        except ImageError as error:
+            self._fault('bad_color', f'colour image cannot be read: {error}')
+            return None
+        depth: DepthImage | None = None
+        if capture.depth is not None and self._depth_wanted():
+            depth = self._readable_depth(capture.depth, color)
+        return Frame(color, depth, time_ns, self._fitting(capture.camera, color))
+
+    def _fitting(self, camera: Camera | None, color: ColorImage) -> Intrinsics | None:
+        """The intrinsics, if they are for images of this size."""
+        if camera is None:
+            return None
+        height, width = color.shape[:2]
+        if camera.width and camera.height and (camera.width, camera.height) != (width, height):
+            self._fault(
+                'bad_camera_info',
+                f'camera_info is for {camera.width}x{camera.height} images but these are '
+                f'{width}x{height}: it is left out',
+            )
+            return None
+        return camera.intrinsics
+
+    def _depth_wanted(self) -> bool:
+        uses = VARIANTS[self.session.variant].uses_depth
+        return uses or self.session.choosing
+
+    def _readable_depth(self, message: Any, color: ColorImage) -> DepthImage | None:
+        try:
+            depth = self._decode_depth(message)
+            Frame(color, depth)
+        except RgbdKcfError as error:
+            self._fault('bad_depth', f'depth image cannot be used: {error}')
+            return None
+        # One pixel in 256 is enough to tell an empty image from a sparse one.
+        sample = depth[::16, ::16]
+        if not (sample > 0).any() and not (depth > 0).any():
+            self._fault('empty_depth', 'depth image has no reading at all: is the sensor covered?')
+        return depth
+
+    def _notice(self, header: Any, moment: Moment) -> None:
+        if moment.jumped:
+            self._fault('time_jumps', 'stamps jumped: a looping bag, or a camera clock not set?')
+            if moment.restarted and self.on_restart is not None:
+                self.on_restart()
+        if self._frame_id is not None and header.frame_id != self._frame_id:
+            self._fault(
+                'frame_id_changes',
+                f'frame_id changed from {self._frame_id!r} to {header.frame_id!r}',
+            )
+        self._frame_id = header.frame_id

@@ -1,0 +1,161 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the tracker node can be told, as data: no ROS is needed to read it.
+
+The variants bring their own parameters; the node shows them as ``<variant>.<name>``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
+
+NEWEST, ALL = 'newest', 'all'
+RAW, COMPRESSED, COMPRESSED_DEPTH = 'raw', 'compressed', 'compressedDepth'
+AUTO, BEST_EFFORT, RELIABLE = 'auto', 'best_effort', 'reliable'
+KEEP, RESTART = 'keep', 'restart'
+
+
+@dataclass(frozen=True)
+class NodeParameters(Parameters):
+    """Parameters of the tracker node itself."""
+
+    variant: str = parameter(
+        DEFAULT_VARIANT,
+        'Which tracker follows the target; a change takes over the target at the next box.',
+        choices=tuple(VARIANTS),
+    )
+    init_box: str = parameter(
+        '',
+        'Target to start on in the next image, as x,y,width,height in pixels of the colour image '
+        '(a list of four numbers is taken too); empty for none.',
+        unit='px',
+    )
+    auto_init: bool = parameter(
+        False,
+        'Choose the target without being told: the nearest upright person-sized thing in range.',
+    )
+    auto_init_again: bool = parameter(
+        False, 'With auto_init: choose again when the target is lost, instead of searching on.'
+    )
+    auto_init_confirm: bool = parameter(
+        True, "With auto_init: take only what OpenCV's HOG people detector also finds."
+    )
+    auto_init_near: float = parameter(
+        0.5, 'Nearest distance at which auto_init looks.', unit='m', minimum=0.1, maximum=20.0
+    )
+    auto_init_far: float = parameter(
+        4.5, 'Farthest distance at which auto_init looks.', unit='m', minimum=0.2, maximum=20.0
+    )
+    on_time_jump: str = parameter(
+        KEEP,
+        'When stamps jump back (a bag that loops): keep the target, or restart from init_box.',
+        choices=(KEEP, RESTART),
+    )
+    pair_tolerance: float = parameter(
+        0.02,
+        'Largest difference between the stamps of a colour image and its depth image.',
+        unit='s',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    depth_wait: float = parameter(
+        0.1,
+        'How long a colour image waits for its depth image before it is used without.',
+        unit='s',
+        minimum=0.0,
+        maximum=5.0,
+    )
+    camera_info_wait: float = parameter(
+        1.0,
+        'How long the first image waits for a camera_info that somebody publishes.',
+        unit='s',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    stale_after: float = parameter(
+        2.0,
+        'Time without images after which diagnostics report the camera as silent.',
+        unit='s',
+        minimum=0.1,
+        maximum=60.0,
+    )
+    queue_policy: str = parameter(
+        NEWEST,
+        'When tracking is slower than the camera: take the newest pair and count the others as '
+        'dropped, or process all pairs in order (recordings, lock-step).',
+        choices=(NEWEST, ALL),
+    )
+    queue_size: int = parameter(
+        60,
+        'With queue_policy all: pairs kept waiting at most; the oldest is dropped beyond.',
+        unit='pairs',
+        minimum=1,
+        maximum=1000,
+    )
+    color_transport: str = parameter(
+        RAW, 'How colour images arrive.', choices=(RAW, COMPRESSED), source='image_transport'
+    )
+    depth_transport: str = parameter(
+        RAW,
+        'How depth images arrive; compressed is the bare PNG or TIFF of kinect2_bridge.',
+        choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
+        source='image_transport',
+    )
+    reliability: str = parameter(
+        AUTO,
+        'QoS of the image subscriptions. Best effort hears every driver; auto is best effort, and '
+        'reliable with queue_policy all.',
+        choices=(AUTO, BEST_EFFORT, RELIABLE),
+    )
+    qos_depth: int = parameter(
+        5, 'QoS history depth of the image subscriptions.', unit='messages', minimum=1, maximum=1000
+    )
+    autostart: bool = parameter(
+        True, 'Configure and activate at once; false waits for a lifecycle manager.'
+    )
+
+
+READ_ONLY = frozenset(
+    {
+        'queue_policy',
+        'queue_size',
+        'color_transport',
+        'depth_transport',
+        'reliability',
+        'qos_depth',
+        'autostart',
+    }
+)
+"""Node parameters that are fixed at start: they decide how the node is wired."""
+
+
+def all_parameters() -> Iterator[ParameterInfo]:
+    """Every ROS parameter of the tracker node: its own, then each variant's with its prefix."""
+    yield from describe(NodeParameters)
+    for name, variant in VARIANTS.items():
+        for info in describe(variant.parameters):
+            yield replace(info, name=f'{name}.{info.name}')
+
+
+def parse_box(text: str) -> Box | None:
+    """The box that ``x,y,width,height`` names, None for an empty text.
+
+    Raises:
+        ParameterError: where the text is not four numbers or the box has no size.
+    """
+    text = text.strip().strip('[]()')
+    if not text:
+        return None
+    try:
+        x, y, width, height = (float(part) for part in text.split(','))
+        return Box(x, y, width, height)
+    except (ValueError, BoxError) as error:
+        reason = error if isinstance(error, BoxError) else f'{text!r} is not four numbers'
+        raise ParameterError(f'parameter init_box: {reason}: give x,y,width,height') from None

@@ -1,0 +1,201 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Following a target by its look alone, for where depth does not tell it from the rest.
+
+A masked correlation filter finds it; its response against its own recent mean says whether it is
+there (the relative test of OTR, Kart et al. 2019, which needs no absolute threshold). Scale comes
+from depth where there is any on the target, else from a filter over scale.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting
+from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+
+LEARN_RATIO = 0.6
+"""Response against its mean from which the target is seen well enough to learn from."""
+LARGE_STEP = 0.08
+"""Seconds between frames in which a target may leave the window."""
+UNSURE = 0.7
+BETTER = 0.25
+SCALE_RATE = 0.025
+SCALE_TIME = 0.1
+SCALE_RANGE = (0.1, 10.0)
+SEARCH_WIDTH = 240
+PEAKS = 2
+DEPTH_SAMPLES = 24
+SAME_DEPTH = 0.15
+MOST = 0.6
+"""Share of readings in the middle of a box from which they are taken to be the target's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Where a target was found by its look.
+
+    Attributes:
+        box: in pixels.
+        ratio: the filter's response against its own recent mean.
+        depth: of the target in metres, None where there is no reading on it.
+    """
+
+    box: Box
+    ratio: float
+    depth: float | None
+
+
+class ByLook:
+    """Follows one target from frame to frame.
+
+    Args:
+        frame: the first.
+        box: the target in it.
+        parameters: of the tracker.
+    """
+
+    def __init__(self, frame: Frame, box: Box, parameters: MetricParameters) -> None:
+        self._parameters = parameters
+        self._cx, self._cy, self._scale = box.cx, box.cy, 1.0
+        self._appearance = Appearance(
+            frame.color,
+            box,
+            cells=parameters.cells,
+            padding=parameters.padding,
+            sigma=parameters.label_sigma,
+            rate=parameters.learning_rate,
+            color_share=parameters.color_share,
+            masked=parameters.use_mask,
+        )
+        self._scales = ScaleFilter(box.width, box.height)
+        self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
+        self._first_depth = self._depth = depth_in(frame, box)
+        self._hidden = False
+        self._unlearned = 0.0
+
+    def step(self, frame: Frame, dt: float) -> Look | None:
+        """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
+        parameters = self._parameters
+        if self._hidden:
+            sighting = self._searched(frame, None)
+            self._hidden = sighting.ratio < parameters.seen_ratio
+        else:
+            sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+            if dt > LARGE_STEP and sighting.ratio < UNSURE:
+                other = self._searched(frame, sighting)
+                if other.ratio > sighting.ratio + BETTER:
+                    sighting = other
+            self._hidden = sighting.ratio < parameters.hidden_ratio
+        return None if self._hidden else self._taken(frame, sighting, dt)
+
+    def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
+        """Look only about where the target is expected, ``box``; None where it is not seen."""
+        self._place(box)
+        sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+        if sighting.ratio < self._parameters.seen_ratio:
+            return None
+        return self._taken(frame, sighting, dt)
+
+    def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
+        """Learn from a target found by other means, but no more often than every ``interval``."""
+        self._unlearned += dt
+        if self._unlearned < interval:
+            return
+        self._place(box)
+        sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+        self._appearance.remember_peak(sighting.peak, self._unlearned)
+        self._appearance.learn(frame.color, self._cx, self._cy, self._scale, self._unlearned)
+        self._depth = depth_in(frame, box) or self._depth
+        self._unlearned = 0.0
+
+    def _place(self, box: Box) -> None:
+        self._hidden = False
+        self._cx, self._cy = box.cx, box.cy
+        ratio = box.height / self._appearance.height
+        self._scale = float(np.clip(ratio, *SCALE_RANGE))
+
+    @property
+    def _size(self) -> tuple[float, float]:
+        return self._appearance.width * self._scale, self._appearance.height * self._scale
+
+    def _searched(self, frame: Frame, best: Sighting | None) -> Sighting:
+        """Look where it was lost, then where in the image the colours fit best.
+
+        The cost is the same whatever the image shows: a fixed number of windows is looked into.
+        """
+        if best is None:
+            best = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+            if best.ratio > self._parameters.seen_ratio:
+                return best
+        step = max(1, round(frame.width / SEARCH_WIDTH))
+        small = np.ascontiguousarray(frame.color[step // 2 :: step, step // 2 :: step])
+        posterior = self._appearance.posterior(small)
+        width, height = (max(1, round(side / step)) for side in self._size)
+        inner = cv2.boxFilter(
+            posterior, -1, (width | 1, height | 1), borderType=cv2.BORDER_REPLICATE
+        )
+        outer = cv2.boxFilter(
+            posterior, -1, (2 * width | 1, 2 * height | 1), borderType=cv2.BORDER_REPLICATE
+        )
+        contrast = inner - np.float32(0.7) * outer
+        for _ in range(PEAKS):
+            row, col = (int(i) for i in np.unravel_index(np.argmax(contrast), contrast.shape))
+            found = self._appearance.look(
+                frame.color, (col + 0.5) * step, (row + 0.5) * step, self._scale
+            )
+            if found.ratio > best.ratio:
+                best = found
+            contrast[
+                max(0, row - height) : row + height + 1, max(0, col - width) : col + width + 1
+            ] = -np.inf
+        return best
+
+    def _taken(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
+        self._cx = float(np.clip(sighting.cx, 0, frame.width))
+        self._cy = float(np.clip(sighting.cy, 0, frame.height))
+        box = Box.from_center(self._cx, self._cy, *self._size)
+        depth = depth_in(frame, box)
+        self._rescale(frame, depth, sighting, dt)
+        box = Box.from_center(self._cx, self._cy, *self._size)
+        if sighting.ratio > LEARN_RATIO:
+            self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
+            rate = min(0.15, SCALE_RATE * dt * 30)
+            self._scales.learn(frame.color, self._cx, self._cy, box.width, box.height, rate)
+            self._appearance.remember_peak(sighting.peak, dt)
+        else:
+            self._appearance.remember_peak(sighting.peak, 0.3 * dt)
+        return Look(box, sighting.ratio, depth)
+
+    def _rescale(self, frame: Frame, depth: float | None, sighting: Sighting, dt: float) -> None:
+        """Follow the size: by depth where it is known, else by the look."""
+        if self._first_depth and self._depth and depth and 0.5 < depth / self._depth < 2:
+            if abs(depth / self._depth - 1) < SAME_DEPTH or sighting.ratio > UNSURE:
+                self._depth = depth
+            wanted = np.log(self._first_depth / self._depth / self._scale)
+            self._scale *= float(np.exp(np.clip(wanted, -0.3, 0.3) * min(1, dt / SCALE_TIME)))
+        else:
+            self._scale *= self._scales.factor(frame.color, self._cx, self._cy, *self._size)
+        self._scale = float(np.clip(self._scale, *SCALE_RANGE))
+
+
+def depth_in(frame: Frame, box: Box) -> float | None:
+    """Median depth in the middle of a box in metres, None where most of it has no reading."""
+    if frame.depth is None:
+        return None
+    middle = box.scaled(0.5).clipped(frame.width, frame.height)
+    if middle is None:
+        return None
+    step = max(1, int(min(middle.width, middle.height) // DEPTH_SAMPLES))
+    depth = frame.depth[
+        int(middle.y) : int(middle.bottom) + 1 : step, int(middle.x) : int(middle.right) + 1 : step
+    ]
+    valid = depth[depth > 0]
+    return float(np.median(valid)) if valid.size > MOST * depth.size else None

@@ -1,0 +1,357 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Following a target by its surface: a thing with a place, a size and colours, in metres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
+from rgbd_kcf_tracker.metric.decide.proposals import Expectation, gathered, propose
+from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
+from rgbd_kcf_tracker.metric.identity.body import Body, Placed
+from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
+from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+FloatArray = npt.NDArray[np.float64]
+
+LOCK_IOU = 0.5
+"""Overlap of the given box with a surface's from which the surface is taken for the target."""
+FIRST_SIGMA = 0.05
+HIDDEN_NOISE = 0.5
+"""Process noise of a hidden target's motion against a visible one's."""
+STRIDE = 0.5
+STRIDE_PER_SECOND = 2.0
+SLOWING = np.array([1.0, 0.25, 1.0])
+GROWN, SHRUNK = 0.3, 0.35
+"""Spread of the log size of a body about what is known of it."""
+PLACED_MIDDLE = 0.4
+LEARN_FRACTION = 0.6
+"""Visible share from which a body of which nothing is cut off is learned from."""
+LEAVING = 0.5
+"""Seconds after the last sight in which a target is seen to leave the image."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidate:
+    """A silhouette, what it would mean for the body, and what speaks for it."""
+
+    seen: Silhouette
+    placed: Placed
+    evidence: Evidence
+    probability: float
+
+
+class BySurface:
+    """Follows one target from scene to scene.
+
+    Args:
+        scene: the first.
+        first: the target's silhouette in it.
+        parameters: of the tracker.
+
+    Attributes:
+        candidates: of the last frame, for looking at what the tracker saw.
+        hidden_for: seconds since the target was last seen.
+    """
+
+    def __init__(self, scene: Scene, first: Silhouette, parameters: MetricParameters) -> None:
+        self._parameters = parameters
+        self.body = Body(first)
+        self._bystanders = Bystanders()
+        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
+        left, top, right, _ = first.metres
+        here = np.array([(left + right) / 2, top, first.depth])
+        placed = self.body.place(first, scene.codes, scene.view, here, None)
+        self.motion = MotionFilter(
+            placed.position,
+            FIRST_SIGMA,
+            parameters.speed,
+            np.full(3, parameters.acceleration),
+        )
+        self._cloud: HiddenCloud | None = None
+        self._rng = np.random.default_rng(parameters.seed)
+        self.hidden_for = self._gone = 0.0
+        self.candidates: list[Candidate] = []
+        self.body.learn_colors(placed, None)
+        self._remember(scene, first)
+        self._learn_around(scene, None)
+
+    @staticmethod
+    def surface_of(scene: Scene, box: Box) -> Silhouette | None:
+        """The surface that a box of the image is drawn about, or None where no one fits."""
+        step = scene.view.step
+        rows, cols = scene.view.shape
+        x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
+        x1, y1 = min(float(cols), box.right / step), min(float(rows), box.bottom / step)
+        if x1 - x0 < 1 or y1 - y0 < 1:
+            return None
+        boxes = scene.surfaces.boxes.astype(np.float64)
+        across = np.minimum(boxes[:, 0] + boxes[:, 2], x1) - np.maximum(boxes[:, 0], x0)
+        down = np.minimum(boxes[:, 1] + boxes[:, 3], y1) - np.maximum(boxes[:, 1], y0)
+        common = np.clip(across, 0, None) * np.clip(down, 0, None)
+        iou = common / (boxes[:, 2] * boxes[:, 3] + (x1 - x0) * (y1 - y0) - common)
+        iou[0] = 0
+        # A wall behind may fill the box as well: it must be the surface that the box shows.
+        inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
+        iou *= np.bincount(inside.ravel(), minlength=len(scene.surfaces)) > 0
+        label = int(np.argmax(iou))
+        return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
+
+    # -- one frame --------------------------------------------------------------------------------
+
+    def step(self, scene: Scene, dt: float) -> Candidate | None:
+        """Look for the target in the next scene, ``dt`` seconds later.
+
+        Returns:
+            What is most likely the target, or None where nothing is. What follows from it is only
+            taken in by :meth:`take` or :meth:`miss`, one of which must be called.
+        """
+        following = self.hidden_for == 0.0
+        self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
+        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
+        if following:
+            self._cloud = None
+        elif self._parameters.use_particles:
+            self._step_cloud(scene, dt)
+        expected = self._expected(dt)
+        missing = self._should_be_seen(scene) > 0.6
+        found = propose(
+            scene, self.body, expected, self._bystanders, self._parameters.most_candidates
+        )
+        self.candidates = [self._weighed(scene, seen, dt, missing) for seen in found]
+        self.candidates.sort(key=lambda c: -c.probability)
+        for candidate in self.candidates[:2]:
+            whole = gathered(scene, self.body, candidate.seen, candidate.placed, self._bystanders)
+            if whole is None:
+                continue
+            more = self._weighed(scene, whole, dt, missing)
+            if _logit(more.probability) > _logit(candidate.probability) - 1.0:
+                self.candidates.append(more)
+                if candidate is self.candidates[0]:
+                    self.candidates.insert(0, self.candidates.pop())
+                    break
+        best = self.candidates[0] if self.candidates else None
+        parameters = self._parameters
+        if best is None or best.probability < parameters.acceptance:
+            return None
+        return best if best.placed.fraction >= parameters.least_visible else None
+
+    def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
+        """Go on from where the target was found, and learn from it what can be learned.
+
+        Returns:
+            The box of its visible part in pixels of the image.
+        """
+        self.hidden_for = self._gone = 0.0
+        seen, placed = found.seen, found.placed
+        self.motion.correct(placed.position, placed.sigma)
+        self._remember(scene, seen)
+        self.body.grow(seen)
+        if not seen.cut.any and placed.fraction > LEARN_FRACTION:
+            self.body.learn_colors(placed, dt)
+            self._learn_around(scene, dt)
+            self.body.learn_size(seen, dt)
+        return self.box(scene, found)
+
+    def miss(self, scene: Scene | None, dt: float) -> None:
+        """Go on without having found the target."""
+        if scene is not None and self.hidden_for < LEAVING:
+            self._gone = max(self._gone, self._outside(scene))
+        self.hidden_for += dt
+        self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
+        if scene is not None:
+            self._remember(scene, None)
+
+    def seen_elsewhere(self, view: DepthView, box: Box) -> None:
+        """Take a box of the image that was found by other means: it tells all but the depth."""
+        k, z = view.intrinsics, float(self.motion.position[2])
+        x = (box.cx / view.step - k.cx) * z / k.fx
+        y = (box.y / view.step - k.cy) * z / k.fy
+        self.motion.correct(np.array([x, y, z]), np.array([0.1, 0.1, 10.0]))
+        self.hidden_for = self._gone = 0.0
+
+    @staticmethod
+    def outline(scene: Scene, seen: Silhouette) -> Box:
+        """The box about a silhouette in pixels of the image."""
+        step = scene.view.step
+        rows, cols = seen.mask.shape
+        return Box(seen.left * step, seen.top * step, cols * step, rows * step)
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _expected(self, dt: float) -> Expectation:
+        sigma = self.motion.sigma
+        reach = 3.0 * np.minimum(sigma, 1.5) + 0.2 + 1.5 * STRIDE_PER_SECOND * min(dt, 0.3)
+        if self.hidden_for > self._parameters.lost_after:
+            reach = reach + 10.0
+        return Expectation(self.motion.position, sigma, reach)
+
+    def _step_cloud(self, scene: Scene, dt: float) -> None:
+        if self._cloud is None:
+            motion = self.motion
+            self._cloud = HiddenCloud(
+                motion.position,
+                motion.velocity,
+                motion.sigma,
+                motion.speed_sigma,
+                self._parameters.particles,
+                self._rng,
+            )
+        self._cloud.step(dt, scene.view, PLACED_MIDDLE * self.body.height)
+
+    def _weighed(self, scene: Scene, seen: Silhouette, dt: float, missing: bool) -> Candidate:
+        body, motion = self.body, self.motion
+        placed = body.place(seen, scene.codes, scene.view, motion.position, motion.sigma)
+        variance = np.square(motion.sigma) + np.square(placed.sigma)
+        away = np.square(placed.position - motion.position)
+        if self._cloud is not None:
+            step = self._cloud.distance(placed.position, placed.sigma)
+        else:
+            step = float((away / variance).sum())
+        at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
+        known, kin = self._bystanders.of(seen, scene.surfaces)
+        if not self._parameters.use_bystanders:
+            known = kin = 0.0
+        evidence = Evidence(
+            step=step,
+            stride=float((away / (variance + at_will)).sum()),
+            pale=max(0.0, body.likeness - placed.likeness) if self._parameters.use_color else 0.0,
+            known=known,
+            kin=kin,
+            fraction=placed.fraction,
+            height=_misfit(
+                seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
+            ),
+            hidden=self.hidden_for,
+            missing=missing,
+            inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
+        )
+        return Candidate(seen, placed, evidence, probability(evidence))
+
+    def _outline(self, view: DepthView) -> tuple[float, float, float, float]:
+        """Where the whole body is expected: left, top, right, bottom in pixels of the view."""
+        k = view.intrinsics
+        x, y, z = self.motion.position
+        half = self.body.width / 2
+        return (
+            (x - half) * k.fx / z + k.cx,
+            y * k.fy / z + k.cy,
+            (x + half) * k.fx / z + k.cx,
+            (y + self.body.height) * k.fy / z + k.cy,
+        )
+
+    def _outline_slices(self, view: DepthView) -> tuple[slice, slice]:
+        """Rows and columns of the view in which the whole body is expected."""
+        if self.motion.position[2] < 0.3:
+            return slice(0, 0), slice(0, 0)
+        left, top, right, bottom = self._outline(view)
+        rows, cols = view.shape
+        x0, x1 = int(np.clip(left, 0, cols)), int(np.clip(right + 1, 0, cols))
+        y0, y1 = int(np.clip(top, 0, rows)), int(np.clip(bottom + 1, 0, rows))
+        return slice(y0, y1), slice(x0, x1)
+
+    def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
+        """Depth where the body is expected, and the pixels it would have if none were outside."""
+        if self.motion.position[2] < 0.3:
+            return np.zeros((0, 0), np.float32), 1.0
+        left, top, right, bottom = self._outline(scene.view)
+        return scene.view.depth[self._outline_slices(scene.view)], max(
+            1.0, (right - left + 1) * (bottom - top + 1)
+        )
+
+    def _should_be_seen(self, scene: Scene) -> float:
+        """Share of the expected body that nothing nearer, no hole and no image edge hides."""
+        depth, total = self._inside(scene)
+        return np.count_nonzero(depth > self.motion.position[2] - 0.15) / total
+
+    def _outside(self, scene: Scene) -> float:
+        """Share of the expected body that lies beyond the left and right edges of the image."""
+        if self.motion.position[2] < 0.3:
+            return 1.0
+        left, _, right, _ = self._outline(scene.view)
+        first, last = scene.rim.left, scene.view.shape[1] - scene.rim.right
+        inside = min(right, last) - max(left, first)
+        return float(np.clip(1.0 - inside / max(right - left, 1.0), 0.0, 1.0))
+
+    def without_depth(self, scene: Scene) -> float:
+        """Share of the expected body, as far as it lies in the image, that has no reading."""
+        depth, total = self._inside(scene)
+        if depth.size < 0.2 * total:
+            return 0.0
+        return 1.0 - np.count_nonzero(depth) / depth.size
+
+    def expected_box(self, view: DepthView) -> Box | None:
+        """The whole body where it is expected, in pixels of the image."""
+        if self.motion.position[2] < 0.3:
+            return None
+        left, top, right, bottom = (v * view.step for v in self._outline(view))
+        return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))
+
+    def _remember(self, scene: Scene, target: Silhouette | None) -> None:
+        possible = self._may_come_out(scene)
+        for c in self.candidates:
+            if c.placed.likeness > self.body.likeness - 0.12 and c.evidence.known < 0.75:
+                possible[c.seen.label] = True
+        self._bystanders.remember(
+            scene.view,
+            scene.surfaces,
+            target,
+            self._outline_slices(scene.view),
+            possible,
+            0.05 * self.body.area,
+        )
+
+    def _may_come_out(self, scene: Scene) -> npt.NDArray[np.bool_]:
+        """Surfaces where a target that has not been hidden for long may come out, ``(n,)``."""
+        boxes = scene.surfaces.boxes
+        rows, cols = self._outline_slices(scene.view)
+        x, _, z = self.motion.sigma
+        beside = int(min(x, 0.5) * scene.view.intrinsics.fx / max(self.motion.position[2], 0.3))
+        near = np.abs(scene.surfaces.depth - self.motion.position[2]) < 0.25 + min(z, 0.25)
+        near &= (boxes[:, 0] < cols.stop + beside) & (boxes[:, 1] < rows.stop)
+        near &= boxes[:, 0] + boxes[:, 2] > cols.start - beside
+        near &= boxes[:, 1] + boxes[:, 3] > rows.start
+        result: npt.NDArray[np.bool_] = near & (
+            self.body.area * 1.7 > scene.surfaces.areas(scene.view.intrinsics)
+        )
+        return result
+
+    def _learn_around(self, scene: Scene, dt: float | None) -> None:
+        """Learn the colours beside the target."""
+        left, top, right, bottom = self._outline(scene.view)
+        rows, cols = scene.view.shape
+        wide = right - left
+        x0 = int(np.clip(left - wide, 0, cols - 2))
+        x1 = int(np.clip(right + wide, x0 + 1, cols))
+        y0 = int(np.clip(top, 0, rows - 2))
+        y1 = int(np.clip(bottom, y0 + 1, rows))
+        other = self._bystanders.beside(slice(y0, y1), slice(x0, x1))
+        self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
+
+    def box(self, scene: Scene, found: Candidate) -> Box:
+        """The box that a candidate would give, in pixels of the image."""
+        return visible_box(scene, self.body, found.seen, float(found.placed.position[1]))
+
+
+def _misfit(size: float, expected: float, cut: bool, known: bool) -> float:
+    """Squared-error term of a size; 0 where it is explained by what cannot be seen."""
+    ratio = float(np.log(size / expected))
+    if (ratio < 0 and cut) or (ratio > 0 and not known):
+        return 0.0
+    return -0.5 * (ratio / (SHRUNK if ratio < 0 else GROWN)) ** 2
+
+
+def _logit(p: float) -> float:
+    p = min(max(p, 1e-9), 1 - 1e-9)
+    return float(np.log(p / (1 - p)))

@@ -1,0 +1,226 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which parts of a scene might be the target.
+
+Surfaces mostly are whole things, but not always: a person who leans on a wall is one surface with
+it, and one behind a pole is two. So surfaces are proposed as they are, cut to where the target is
+expected, narrowed to its width, and gathered with the pieces around them; what is right is decided
+by the evidence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.identity.body import Body, Placed
+from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAST_PIXELS = 12
+LEAST_SHARE = 0.06
+MOST_SHARE = 3.0
+"""Area of a proposed surface against the target's."""
+TOO_LARGE = 1.7
+"""Area against the target's from which a surface is taken for the target and something else."""
+MIXED = 0.2
+"""Share of known pixels from which likewise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """Where the target is expected, ``(3,)`` metres each.
+
+    Attributes:
+        position: of the body's reference point.
+        sigma: its standard deviations.
+        reach: distances within which surfaces are considered at all.
+    """
+
+    position: FloatArray
+    sigma: FloatArray
+    reach: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Sizes of all surfaces in metres, ``(n,)`` each."""
+
+    area: FloatArray
+    x: FloatArray
+    y: FloatArray
+    width: FloatArray
+    height: FloatArray
+
+    @classmethod
+    def of(cls, scene: Scene) -> Facts:
+        """Measure every surface of a scene."""
+        k, surfaces = scene.view.intrinsics, scene.surfaces
+        z = surfaces.depth.astype(np.float64)
+        boxes = surfaces.boxes
+        return cls(
+            surfaces.areas(k),
+            (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
+            (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
+            boxes[:, 2] * z / k.fx,
+            boxes[:, 3] * z / k.fy,
+        )
+
+
+def propose(
+    scene: Scene, body: Body, expected: Expectation, bystanders: Bystanders, most: int
+) -> list[Silhouette]:
+    """Surfaces within reach, as they are and cut to the target.
+
+    Args:
+        scene: of now.
+        body: the target.
+        expected: where it is expected.
+        bystanders: what is known not to be it, compared with this scene.
+        most: largest number of whole surfaces to propose, the nearest to ``expected`` first.
+    """
+    facts = Facts.of(scene)
+    z = scene.surfaces.depth
+    away = np.stack(
+        (
+            np.abs(facts.x - expected.position[0]) / (expected.reach[0] + body.width),
+            np.abs(facts.y - expected.position[1] - body.height / 2)
+            / (expected.reach[1] + body.height / 2),
+            np.abs(z - expected.position[2]) / (expected.reach[2] + 0.15),
+        )
+    ).max(axis=0)
+    possible = (scene.surfaces.pixels >= LEAST_PIXELS) & (away < 1)
+    possible &= (facts.area > LEAST_SHARE * body.area) & (facts.area < MOST_SHARE * body.area)
+    possible[0] = False
+    labels = np.flatnonzero(possible)
+    if len(labels) > most:
+        labels = labels[np.argsort(away[labels])[:most]]
+    found = [scene.silhouette(int(label)) for label in labels]
+    found += _split(scene, body, expected, bystanders, facts)
+    narrow = (_narrowed(scene, body, seen, expected, bystanders) for seen in found)
+    return found + [seen for seen in narrow if seen is not None]
+
+
+def _split(
+    scene: Scene, body: Body, expected: Expectation, bystanders: Bystanders, facts: Facts
+) -> list[Silhouette]:
+    """Cut the expected target out of surfaces that are more than the target."""
+    view = scene.view
+    k = view.intrinsics
+    x, y, z = expected.position
+    if z < 0.2:
+        return []
+    large = facts.area > TOO_LARGE * body.area
+    large |= (bystanders.share > MIXED) & (facts.area > body.area)
+    large[0] = False
+    if not large.any():
+        return []
+    beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
+    above = min(2 * expected.sigma[1] + 0.15, 0.5)
+    rows, cols = view.shape
+    left = int(np.clip((x - beside) * k.fx / z + k.cx, 0, cols))
+    right = int(np.clip((x + beside) * k.fx / z + k.cx + 1, 0, cols))
+    top = int(np.clip((y - above) * k.fy / z + k.cy, 0, rows))
+    bottom = int(np.clip((y + body.height + above) * k.fy / z + k.cy + 1, 0, rows))
+    if right - left < 3 or bottom - top < 3:
+        return []
+    depth = view.depth[top:bottom, left:right]
+    mask = large[scene.surfaces.labels[top:bottom, left:right]]
+    mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
+    mask &= ~bystanders.known[top:bottom, left:right]
+    if not mask.any():
+        return []
+    pieces = cut(depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre)
+    found = []
+    for i in range(1, len(pieces)):
+        area = pieces.pixels[i] * float(pieces.depth[i]) ** 2 / (k.fx * k.fy)
+        if pieces.pixels[i] < LEAST_PIXELS or area < 0.1 * body.area:
+            continue
+        u, v, w, h = (int(t) for t in pieces.boxes[i])
+        part = pieces.labels[v : v + h, u : u + w] == i
+        found.append(Silhouette.of(view, left + u, top + v, part, 0, scene.rim))
+    return found
+
+
+def _narrowed(
+    scene: Scene,
+    body: Body,
+    seen: Silhouette,
+    expected: Expectation,
+    bystanders: Bystanders,
+) -> Silhouette | None:
+    """The part of a too wide silhouette that most likely is the target, by colour and place."""
+    k = scene.view.intrinsics
+    wanted = body.width * 1.1
+    if not body.width_known or seen.width < 1.3 * wanted:
+        return None
+    known = bystanders.known[seen.rows, seen.cols]
+    if seen.area < TOO_LARGE * body.area and known[seen.mask].mean() < MIXED:
+        return None
+    cols = max(2, round(wanted * k.fx / seen.depth))
+    codes = scene.codes[seen.rows, seen.cols]
+    odds = body.odds_of(codes, seen, scene.view, float(expected.position[1]))
+    odds[~seen.mask] = 0
+    odds -= np.float32(0.5) * known
+    profile = np.convolve(odds.sum(axis=0), np.ones(cols), 'valid')
+    middle = seen.left + np.arange(len(profile)) + cols / 2
+    x = (middle - k.cx) * seen.depth / k.fx
+    pixels = max(20.0, np.count_nonzero(seen.mask) / seen.mask.shape[1] * cols)
+    spread = expected.sigma[0] ** 2 + 0.1**2
+    score = 6 * profile / pixels - 0.5 * np.square(x - expected.position[0]) / spread
+    first = int(np.argmax(score))
+    part = seen.mask[:, first : first + cols]
+    rows = np.flatnonzero(part.any(axis=1))
+    across = np.flatnonzero(part.any(axis=0))
+    if not len(rows):
+        return None
+    part = part[rows[0] : rows[-1] + 1, across[0] : across[-1] + 1]
+    return Silhouette.of(
+        scene.view, seen.left + first + int(across[0]), seen.top + int(rows[0]), part, 0, scene.rim
+    )
+
+
+def gathered(
+    scene: Scene, body: Body, seen: Silhouette, placed: Placed, bystanders: Bystanders
+) -> Silhouette | None:
+    """A silhouette with the pieces that lie within the body that it belongs to.
+
+    Returns:
+        None where there is nothing to add.
+    """
+    view, surfaces = scene.view, scene.surfaces
+    k = view.intrinsics
+    rows, cols = seen.mask.shape
+    scale = k.fx / seen.depth
+    half = 0.6 * max(body.width, seen.width)
+    left = min((placed.position[0] - half) * scale + k.cx, seen.left)
+    right = max((placed.position[0] + half) * scale + k.cx, seen.left + cols)
+    if seen.label == 0:
+        # A part cut out of something larger is not to be joined with the rest of that again.
+        left, right = max(left, seen.left - 1), min(right, seen.left + cols + 1)
+    height = max(body.height, seen.height)
+    top = (placed.position[1] - 0.15 * height) * k.fy / seen.depth + k.cy
+    bottom = (placed.position[1] + 1.05 * height) * k.fy / seen.depth + k.cy
+    boxes = surfaces.boxes
+    inside = (boxes[:, 0] >= left) & (boxes[:, 0] + boxes[:, 2] <= right)
+    inside &= (boxes[:, 1] >= top) & (boxes[:, 1] + boxes[:, 3] <= bottom)
+    inside &= np.abs(surfaces.depth - seen.depth) < 0.2 + 0.02 * seen.depth
+    inside &= (surfaces.pixels >= 3) & (bystanders.share < 0.5)
+    inside[0] = False
+    inside[seen.label] = False
+    more = boxes[inside]
+    if not len(more):
+        return None
+    x0, y0 = min(seen.left, int(more[:, 0].min())), min(seen.top, int(more[:, 1].min()))
+    x1 = max(seen.left + cols, int((more[:, 0] + more[:, 2]).max()))
+    y1 = max(seen.top + rows, int((more[:, 1] + more[:, 3]).max()))
+    mask = inside[surfaces.labels[y0:y1, x0:x1]]
+    mask[seen.top - y0 : seen.top - y0 + rows, seen.left - x0 : seen.left - x0 + cols] |= seen.mask
+    return Silhouette.of(view, x0, y0, mask, seen.label, scene.rim)

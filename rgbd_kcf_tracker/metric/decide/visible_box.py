@@ -1,0 +1,70 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The box of what shows of a body, with what the depth sensor did not see of it added."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.identity.body import Body
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+FOOT = 0.2
+"""Metres above the floor up to which a body is taken to stand on it."""
+RIM = 2
+"""Columns without a reading from which the depth image is narrower than the colour image."""
+SLIMMEST = 0.4
+"""Width of a body against its height, at the least, where it has never been seen whole."""
+LIKE = 0.25
+"""Share of a column's pixels in the body's colours up to which it is taken to go on."""
+
+
+def visible_box(scene: Scene, body: Body, seen: Silhouette, top: float) -> Box:
+    """The box of a silhouette in pixels of the image.
+
+    Feet, which go with the floor when that is taken out, are added down to the floor; and where the
+    depth image ends before the colour image does, the columns that go on in the body's colours.
+
+    Args:
+        scene: of now.
+        body: the target.
+        seen: its silhouette.
+        top: metres, of the body's upper edge.
+    """
+    rows, cols = seen.mask.shape
+    left, right = float(seen.left), float(seen.left + cols)
+    bottom = float(seen.top + rows)
+    if scene.floor is not None and not seen.cut.bottom:
+        foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
+        if 0 < (foot - bottom) * seen.depth / scene.view.intrinsics.fy < FOOT:
+            bottom = foot
+    width = scene.view.shape[1]
+    if scene.rim.left > RIM and left <= scene.rim.left + RIM:
+        left -= _beyond_rim(scene, body, seen, top, -1)
+    if scene.rim.right > RIM and right >= width - scene.rim.right - RIM:
+        right += _beyond_rim(scene, body, seen, top, 1)
+    step = scene.view.step
+    return Box.from_corners(left * step, seen.top * step, right * step, bottom * step)
+
+
+def _beyond_rim(scene: Scene, body: Body, seen: Silhouette, top: float, way: int) -> int:
+    """Columns by which the body goes on where depth has ended but colour has not."""
+    most = max(body.width, SLIMMEST * body.height)
+    cols = seen.mask.shape[1]
+    limit = int(most * scene.view.intrinsics.fx / seen.depth) - cols + 2
+    if limit <= 0:
+        return 0
+    codes = scene.codes[seen.rows]
+    if way > 0:
+        codes = codes[:, seen.left + cols : seen.left + cols + limit]
+    else:
+        codes = codes[:, max(0, seen.left - limit) : seen.left][:, ::-1]
+    if codes.shape[1] == 0:
+        return 0
+    odds = body.odds_of(codes, seen, scene.view, top)
+    like = np.convolve((odds > 0).mean(axis=0), np.ones(3) / 3, 'same')
+    ends = np.flatnonzero(like < LIKE)
+    return int(ends[0]) if len(ends) else codes.shape[1]

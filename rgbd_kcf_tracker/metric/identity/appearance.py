@@ -1,0 +1,190 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the target looks like: a masked correlation filter and its colours, learned together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy import fft
+
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
+from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures, resampled
+
+Image = npt.NDArray[np.uint8]
+
+FRAME = 1 / 30
+"""Seconds to which the learning rates refer."""
+MAX_RATE = 0.15
+COLOR_RATE = 2.0
+"""How much faster than the filter the colours are learned."""
+MEAN_TIME = 0.7
+"""Seconds over which the mean peak is taken."""
+FIRST_PEAK = 0.6
+"""What later peaks are of the first, which is that of the very sample just learned."""
+MIN_MASK = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """Where the target is most likely within a window.
+
+    Attributes:
+        cx, cy: its centre in pixels of the image.
+        peak: the filter's response there.
+        ratio: ``peak`` against its own recent mean while the target was seen.
+    """
+
+    cx: float
+    cy: float
+    peak: float
+    ratio: float
+
+
+class Appearance:
+    """The look of one target at a fixed number of cells, whatever its size in the image.
+
+    Args:
+        color: ``(H, W, 3)`` uint8 BGR, the first image.
+        box: the target in it.
+        cells: along a side of the search window.
+        padding: the window is the target's mean side plus this many times its root area.
+        sigma: width of the wanted response, in sixteenths of the target's root area.
+        rate: share of a new sample in the filter, for each thirtieth of a second.
+        color_share: weight of the colour posterior beside the filter's response, 0 to 1.
+        masked: hold the filter to the pixels of the target's colours, else to its box.
+        iterations: of the filter's solver for each sample.
+    """
+
+    def __init__(
+        self,
+        color: Image,
+        box: Box,
+        *,
+        cells: int,
+        padding: float,
+        sigma: float,
+        rate: float,
+        color_share: float,
+        masked: bool = True,
+        iterations: int = 3,
+    ) -> None:
+        self.width, self.height = box.width, box.height
+        root = float(np.sqrt(box.area))
+        self._base = (box.width + box.height) / 2 + padding * root
+        self._features = PatchFeatures(cells)
+        self._cells = cells
+        self._pixels = self._features.pixels
+        scale = self._pixels / self._base
+        self._target = (box.width * scale, box.height * scale)
+        width = sigma * np.sqrt(self._target[0] * self._target[1]) / 16 / (self._pixels / cells)
+        self._filter = MaskedFilter(cells, max(0.6, float(width)), iterations)
+        self._colors = ColorPosterior()
+        self._rate = rate
+        self._masked = masked
+        self._share = np.float32(color_share)
+        self._inner, self._outer, self._near = (self._boxed(k) for k in (0.85, 1.15, 2.0))
+        self._core = self._cell_box(1.0)
+        self._reach = self._cell_box(1.1)
+        self.mean_peak = 0.0
+        self.learn(color, box.cx, box.cy, 1.0, None)
+        self.mean_peak = FIRST_PEAK * self.look(color, box.cx, box.cy, 1.0).peak
+
+    def _boxed(self, factor: float) -> npt.NDArray[np.bool_]:
+        place = np.abs(np.arange(self._pixels) + 0.5 - self._pixels / 2)
+        across = place <= self._target[0] * factor / 2
+        down = place <= self._target[1] * factor / 2
+        inside: npt.NDArray[np.bool_] = down[:, None] & across[None, :]
+        return inside
+
+    def _cell_box(self, factor: float) -> npt.NDArray[np.bool_]:
+        place = np.abs(np.arange(self._cells) + 0.5 - self._cells / 2) * (
+            self._pixels / self._cells
+        )
+        across = place <= max(self._target[0] * factor / 2, 2.0)
+        down = place <= max(self._target[1] * factor / 2, 2.0)
+        inside: npt.NDArray[np.bool_] = down[:, None] & across[None, :]
+        return inside
+
+    def _window(self, color: Image, cx: float, cy: float, scale: float) -> Image:
+        return resampled(color, cx, cy, self._base * scale, self._pixels)
+
+    def posterior(self, color: Image) -> npt.NDArray[np.float32]:
+        """How likely each pixel of an image is the target's by its colour, ``(h, w)`` 0 to 1."""
+        return self._colors.of(rgb_codes(color))
+
+    def look(self, color: Image, cx: float, cy: float, scale: float) -> Sighting:
+        """Look for the target in the window about ``cx, cy``.
+
+        Args:
+            color: ``(H, W, 3)`` uint8 BGR.
+            cx: column of the window's middle in pixels.
+            cy: row of the window's middle.
+            scale: the target's size against its first one.
+        """
+        window = self._window(color, cx, cy, scale)
+        response = self._filter.response(self._features(window))
+        total = response
+        if self._share > 0:
+            posterior = self._colors.of(rgb_codes(window))
+            size = (int(self._target[0]) | 1, int(self._target[1]) | 1)
+            mean = cv2.boxFilter(posterior, -1, size, borderType=cv2.BORDER_REPLICATE)
+            mean = cv2.resize(mean, (self._cells, self._cells), interpolation=cv2.INTER_AREA)
+            total = (1 - self._share) * response + self._share * fft.ifftshift(mean)
+        n = self._cells
+        i, j = (int(k) for k in np.unravel_index(int(np.argmax(total)), total.shape))
+        dy = _vertex(total[(i - 1) % n, j], total[i, j], total[(i + 1) % n, j])
+        dx = _vertex(total[i, (j - 1) % n], total[i, j], total[i, (j + 1) % n])
+        pixel = self._base * scale / n
+        peak = float(response[i, j])
+        return Sighting(
+            cx + ((j + n // 2) % n - n // 2 + dx) * pixel,
+            cy + ((i + n // 2) % n - n // 2 + dy) * pixel,
+            peak,
+            peak / max(self.mean_peak, 1e-6),
+        )
+
+    def remember_peak(self, peak: float, dt: float) -> None:
+        """Take a peak at which the target was surely seen into the mean."""
+        self.mean_peak += (1 - np.exp(-dt / MEAN_TIME)) * (peak - self.mean_peak)
+
+    def learn(self, color: Image, cx: float, cy: float, scale: float, dt: float | None) -> None:
+        """Take the target at ``cx, cy`` as a sample, ``dt`` seconds after the last (None: none)."""
+        if dt is None:
+            rate = color_rate = 1.0
+        else:
+            rate = min(MAX_RATE, 1 - (1 - self._rate) ** (dt / FRAME))
+            color_rate = min(MAX_RATE, COLOR_RATE * rate)
+        window = self._window(color, cx, cy, scale)
+        codes = rgb_codes(window)
+        self._colors.learn(codes, self._inner, self._near & ~self._outer, color_rate)
+        self._filter.learn(self._features(window), self._mask(codes), rate)
+
+    def _mask(self, codes: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
+        """Where in the window the filter may look: the pixels of the target's colours."""
+        if not self._masked:
+            return self._core.astype(np.float32)
+        posterior = self._colors.of(codes)
+        n = self._cells
+        posterior = cv2.resize(posterior, (n, n), interpolation=cv2.INTER_AREA)
+        posterior = cv2.GaussianBlur(posterior, (3, 3), 0)
+        mask = ((posterior > 0.5) & self._reach).astype(np.float32)
+        if mask[self._core].mean() < MIN_MASK:
+            return self._core.astype(np.float32)
+        mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+        result: npt.NDArray[np.float32] = np.maximum(mask, np.float32(0.3) * self._core)
+        return result
+
+
+def _vertex(before: float, peak: float, after: float) -> float:
+    """Offset of a parabola's top from its middle sample, at most half a sample."""
+    bend = before + after - 2 * peak
+    if bend > -1e-9:
+        return 0.0
+    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5))

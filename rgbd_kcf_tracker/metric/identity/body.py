@@ -1,0 +1,240 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The target as a body: its size in metres and the colours of its parts from top to bottom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.perceive.color_bands import (
+    BANDS,
+    CODES,
+    band_histograms,
+    band_similarity,
+    bands_of_rows,
+    smoothed,
+)
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+FloatArray = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.int32]
+
+GROW_TIME = 0.4
+SHRINK_TIME = 4.0
+"""Seconds in which the size follows what is seen: arms go out fast and a side view does not make a
+body smaller for long."""
+USUAL_TIME = 20.0
+"""Seconds over which the usual area is taken."""
+MOST_GROWTH = 1.7
+"""Area against the usual one from which a body has more likely run together with another."""
+COLOR_TIME = 1.0
+"""Seconds in which the colours follow."""
+FIRST_LIKENESS = 0.9
+ANCHOR = 0.03
+ANCHOR_PER_METRE = 0.01
+WOBBLE = 0.06
+"""Metres by which limbs move the outline of a body about its place."""
+DEPTH_SIGMA = 0.05
+DEPTH_SIGMA_PER_METRE = 0.02
+ODDS_FLOOR = 1e-3
+ODDS_LIMIT = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """A silhouette taken as the visible part of the body.
+
+    Attributes:
+        position: ``(3,)`` metres: the middle of the body across, its top, its depth.
+        sigma: ``(3,)`` metres, how sure that is; large where the side that tells it is cut off.
+        histograms: ``(BANDS, CODES)`` of its colours.
+        likeness: of its colours to the body's, 0 to 1.
+        fraction: of the body that shows; above 1 where more shows than is known of.
+    """
+
+    position: FloatArray
+    sigma: FloatArray
+    histograms: npt.NDArray[np.float32]
+    likeness: float
+    fraction: float
+
+
+class Body:
+    """Size and colours of the target.
+
+    The reference point is the middle of its upper edge: feet are often hidden or cut off by the
+    image, the head seldom.
+
+    Attributes:
+        width, height: metres.
+        area: square metres seen from the camera.
+        width_known, height_known: False until both of its ends have been seen.
+        likeness: mean of what :class:`Placed` says of it while it is in sight.
+    """
+
+    def __init__(self, first: Silhouette) -> None:
+        self.width, self.height, self.area = first.width, first.height, first.area
+        self.width_known = not (first.cut.left or first.cut.right)
+        self.height_known = not (first.cut.top or first.cut.bottom)
+        self._usual_area = first.area
+        self.likeness = FIRST_LIKENESS
+        self._colors = np.zeros((BANDS, CODES), np.float32)
+        self._around = np.full(CODES, 1 / CODES, np.float32)
+        self.odds = np.zeros((BANDS, CODES), np.float32)
+
+    # -- where a silhouette puts the body ---------------------------------------------------------
+
+    def place(
+        self,
+        seen: Silhouette,
+        codes: Codes,
+        view: DepthView,
+        expected: FloatArray,
+        expected_sigma: FloatArray | None,
+    ) -> Placed:
+        """Take a silhouette as the visible part of the body.
+
+        Args:
+            seen: the silhouette.
+            codes: ``(h, w)`` colour codes of the view.
+            view: the depth.
+            expected: ``(3,)`` metres, where the body's reference point is expected.
+            expected_sigma: ``(3,)`` metres, or None where nothing better than ``seen`` is known.
+        """
+        x, x_sigma = self._across(seen, expected[0])
+        y, y_sigma = self._top(seen, expected[1])
+        z = seen.depth
+        fraction = self._fraction(seen)
+        crop = codes[seen.rows, seen.cols]
+        counts = self._histograms(seen, crop, view, y)
+        likeness = band_similarity(counts, self._colors)
+        lower = y - expected[1] > 0.08 * self.height
+        if expected_sigma is not None and lower and fraction < 0.8 and expected_sigma[1] < 0.3:
+            # The head may be hidden without a nearer surface beside it: see whether the colours
+            # fit the parts lower down.
+            counts_below = self._histograms(seen, crop, view, expected[1])
+            likeness_below = band_similarity(counts_below, self._colors)
+            if likeness_below > likeness:
+                counts, likeness = counts_below, likeness_below
+                y, y_sigma = float(expected[1]), y_sigma + 0.2 * self.height
+        sigma = np.hypot(WOBBLE, np.array([x_sigma, y_sigma, _depth_sigma(z)]))
+        return Placed(np.array([x, y, z]), sigma, counts, likeness, fraction)
+
+    def _fraction(self, seen: Silhouette) -> float:
+        extent = seen.width * seen.height / (self.width * self.height)
+        # A body seen from its side has less area than its outline suggests.
+        return max(seen.area / self.area, 0.8 * min(extent, 1.0))
+
+    def _across(self, seen: Silhouette, expected: float) -> tuple[float, float]:
+        left, _, right, _ = seen.metres
+        sure = ANCHOR + ANCHOR_PER_METRE * seen.depth
+        if seen.cut.left and seen.cut.right:
+            low, high = sorted((right - self.width / 2, left + self.width / 2))
+            return float(np.clip(expected, low, high)), sure + 0.25 * self.width
+        if not seen.cut.any or right - left >= self.width or not (seen.cut.left or seen.cut.right):
+            return (left + right) / 2, sure
+        if seen.cut.left:
+            return right - self.width / 2, sure + 0.1 * self.width
+        return left + self.width / 2, sure + 0.1 * self.width
+
+    def _top(self, seen: Silhouette, expected: float) -> tuple[float, float]:
+        _, top, _, bottom = seen.metres
+        sure = ANCHOR + ANCHOR_PER_METRE * seen.depth
+        if not seen.cut.top or bottom - top > self.height:
+            return top, sure
+        if not seen.cut.bottom:
+            return bottom - self.height, sure + 0.1 * self.height
+        return float(np.clip(expected, bottom - self.height, top)), sure + 0.25 * self.height
+
+    # -- colours ----------------------------------------------------------------------------------
+
+    def _rows(self, seen: Silhouette, view: DepthView, top: float) -> tuple[float, float]:
+        """First row of the body within the silhouette's crop, and its number of rows."""
+        k = view.intrinsics
+        row = top * k.fy / seen.depth + k.cy - seen.top
+        return row, self.height * k.fy / seen.depth
+
+    def _histograms(
+        self, seen: Silhouette, crop: Codes, view: DepthView, top: float
+    ) -> npt.NDArray[np.float32]:
+        row, rows = self._rows(seen, view, top)
+        return band_histograms(crop, seen.mask, row, rows)
+
+    def odds_of(
+        self, codes: Codes, seen: Silhouette, view: DepthView, top: float
+    ) -> npt.NDArray[np.float32]:
+        """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
+
+        Args:
+            codes: ``(h, n)`` with the silhouette's rows.
+            seen: the silhouette.
+            view: the depth.
+            top: metres, of the body's upper edge.
+        """
+        row, rows = self._rows(seen, view, top)
+        band = bands_of_rows(codes.shape[0], row, rows)
+        result: npt.NDArray[np.float32] = self.odds[band[:, None], codes]
+        return result
+
+    # -- learning ---------------------------------------------------------------------------------
+
+    def learn_size(self, seen: Silhouette, dt: float) -> None:
+        """Follow the size of a silhouette of which nothing is cut off."""
+        grow, shrink = 1 - np.exp(-dt / GROW_TIME), 1 - np.exp(-dt / SHRINK_TIME)
+
+        def eased(old: float, new: float) -> float:
+            return float(old * (new / old) ** (grow if new > old else shrink))
+
+        self._usual_area *= (seen.area / self._usual_area) ** (1 - np.exp(-dt / USUAL_TIME))
+        self.area = min(eased(self.area, seen.area), MOST_GROWTH * self._usual_area)
+        self.width = eased(self.width, seen.width)
+        self.height = eased(self.height, seen.height)
+
+    def grow(self, seen: Silhouette) -> None:
+        """Take in more of a body that was cut off wherever it has been seen so far."""
+        if not self.height_known:
+            self._enlarge(seen.height / self.height)
+            self.height = max(self.height, seen.height)
+            self.height_known = not (seen.cut.top or seen.cut.bottom)
+        if not self.width_known:
+            self._enlarge(seen.width / self.width)
+            self.width = max(self.width, seen.width)
+            self.width_known = not (seen.cut.left or seen.cut.right)
+
+    def _enlarge(self, factor: float) -> None:
+        self.area *= max(1.0, factor)
+        self._usual_area *= max(1.0, factor)
+
+    def learn_colors(self, placed: Placed, dt: float | None) -> None:
+        """Follow the colours; ``dt`` seconds since the last time, None at first."""
+        rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
+        total = placed.histograms.sum(axis=1)
+        rates = np.where(self._colors.sum(axis=1) == 0, 1.0, rate)
+        rates[total <= 8] = 0.0
+        r = rates[:, None].astype(np.float32)
+        self._colors = (1 - r) * self._colors + r * (
+            placed.histograms / np.maximum(total, 1)[:, None]
+        )
+        if dt is not None:
+            self.likeness += rate * (placed.likeness - self.likeness)
+
+    def learn_around(self, codes: Codes, known: npt.NDArray[np.bool_], dt: float | None) -> None:
+        """Follow the colours of what stands beside the body: ``codes`` where ``known``."""
+        rate = np.float32(0.7 if dt is None else 1 - np.exp(-dt / COLOR_TIME))
+        counts = np.bincount(codes[known], minlength=CODES).astype(np.float32)
+        counts = smoothed(counts[None])[0]
+        total = counts.sum()
+        if total > 20:
+            self._around = (1 - rate) * self._around + rate * counts / total
+        floor = np.float32(ODDS_FLOOR)
+        odds = np.log((self._colors + floor) / (self._around + floor))
+        self.odds = np.clip(odds, -ODDS_LIMIT, ODDS_LIMIT)
+
+
+def _depth_sigma(z: float) -> float:
+    return DEPTH_SIGMA + DEPTH_SIGMA_PER_METRE * z

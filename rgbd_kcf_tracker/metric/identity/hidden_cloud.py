@@ -1,0 +1,131 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Where a target that cannot be seen may be.
+
+Particles in metres, that die where the camera sees that there is nothing.
+
+The thesis (section 5.3) carries particles in pixels with a box; here they carry position and
+velocity in metres and seconds, so that the frame rate does not matter, and the absence of the
+target is evidence too: what is left lies behind something, in a hole of the depth image, or out of
+view.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+
+FloatArray = npt.NDArray[np.float64]
+
+TURN_TIME = np.array([1.2, 0.25, 1.2])
+"""Seconds in which a hidden target's velocity is forgotten: it may stop or turn; up and down it
+does not go on for long."""
+ROAM = np.array([0.9, 0.15, 0.9])
+"""Metres per second of the velocity that comes instead."""
+EMPTY_MARGIN = 0.3
+"""Metres by which the camera must see past a particle to know that it is not there."""
+EMPTY_TIME = 0.12
+"""Seconds in which the weight of such a particle falls to a third."""
+KERNEL = 0.2
+"""Metres of the kernel that makes a density of the particles."""
+
+
+class HiddenCloud:
+    """The particles of one disappearance.
+
+    Args:
+        position: ``(3,)`` metres, the reference point of the target when it was last predicted.
+        velocity: ``(3,)`` metres per second.
+        position_sigma: ``(3,)`` metres.
+        speed_sigma: ``(3,)`` metres per second.
+        count: number of particles.
+        rng: source of randomness.
+    """
+
+    def __init__(
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        position_sigma: FloatArray,
+        speed_sigma: FloatArray,
+        count: int,
+        rng: np.random.Generator,
+    ) -> None:
+        self._rng = rng
+        self._positions = position + position_sigma * rng.standard_normal((count, 3))
+        spread = np.maximum(speed_sigma, 0.3 * ROAM)
+        self._velocities = velocity + spread * rng.standard_normal((count, 3))
+        self._weights = np.full(count, 1.0 / count)
+
+    def step(self, dt: float, view: DepthView, middle: float) -> None:
+        """Move on by ``dt`` seconds and weigh by what the camera sees.
+
+        Args:
+            dt: seconds.
+            view: the depth of now.
+            middle: metres from the reference point down to the middle of the target.
+        """
+        keep = np.exp(-dt / TURN_TIME)
+        noise = ROAM * np.sqrt(1 - keep**2)
+        self._velocities *= keep
+        self._velocities += noise * self._rng.standard_normal(self._velocities.shape)
+        self._positions += self._velocities * dt
+        np.maximum(self._positions[:, 2], 0.2, out=self._positions[:, 2])
+        self._weights *= np.where(self._seen_empty(view, middle), np.exp(-dt / EMPTY_TIME), 1.0)
+        total = self._weights.sum()
+        if total < 1e-12:
+            self._weights[:] = 1.0 / len(self._weights)
+            return
+        self._weights /= total
+        if 1.0 / np.square(self._weights).sum() < 0.5 * len(self._weights):
+            self._resample()
+
+    def _seen_empty(self, view: DepthView, middle: float) -> npt.NDArray[np.bool_]:
+        """Particles past which the camera sees."""
+        k = view.intrinsics
+        rows, cols = view.shape
+        x, y, z = self._positions.T
+        u = (x * k.fx / z + k.cx).astype(np.int32)
+        v = ((y + middle) * k.fy / z + k.cy).astype(np.int32)
+        inside = (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
+        seen = view.depth[np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)]
+        empty: npt.NDArray[np.bool_] = inside & (seen > z + EMPTY_MARGIN)
+        return empty
+
+    def _resample(self) -> None:
+        """Systematic resampling."""
+        count = len(self._weights)
+        place = (self._rng.random() + np.arange(count)) / count
+        index = np.minimum(np.searchsorted(np.cumsum(self._weights), place), count - 1)
+        self._positions = self._positions[index]
+        self._velocities = self._velocities[index]
+        self._weights = np.full(count, 1.0 / count)
+
+    @property
+    def mean(self) -> FloatArray:
+        """Weighted mean position, ``(3,)`` metres."""
+        result: FloatArray = self._weights @ self._positions
+        return result
+
+    @property
+    def spread(self) -> FloatArray:
+        """Standard deviation of the position, ``(3,)`` metres."""
+        result: FloatArray = np.sqrt(self._weights @ np.square(self._positions - self.mean))
+        return result
+
+    def distance(self, position: FloatArray, sigma: FloatArray) -> float:
+        """How far a place is from where the target may be; 0 is amid all particles.
+
+        Minus twice the log of the particles' kernel density, relative to a kernel's height.
+
+        Args:
+            position: ``(3,)`` metres.
+            sigma: ``(3,)`` metres, deviation of the place itself.
+        """
+        width = np.square(sigma) + KERNEL**2
+        exponent = -0.5 * (np.square(self._positions - position) / width).sum(axis=1)
+        density = float(self._weights @ np.exp(exponent))
+        return -2.0 * float(np.log(density + 1e-12))

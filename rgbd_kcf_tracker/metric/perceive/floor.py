@@ -1,0 +1,158 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The floor, found in a depth image, so that what stands on it comes apart from it.
+
+Along a plane the inverse of depth is affine in the pixel: ``1/z = a u + b v + c``. The floor is the
+plane below the camera under which (almost) nothing lies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+
+MIN_UPRIGHT = 0.75
+"""Cosine of the largest tilt between the camera's down axis and the floor's normal."""
+CAMERA_HEIGHT = (0.25, 3.5)
+"""Metres the camera may stand above the floor."""
+MIN_SHARE = 0.06
+"""Least share of the sampled pixels that must lie on the floor."""
+TRIALS = 96
+SAMPLES = 600
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A plane in a view: ``1/z = a u + b v + c`` with the camera ``height`` metres above it."""
+
+    a: float
+    b: float
+    c: float
+    height: float
+
+    def elevation(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """Metres above the floor of each pixel, ``(h, w)`` float32; ``height`` where depth is 0."""
+        h, w = depth.shape
+        rows = np.arange(h, dtype=np.float32)[:, None] * np.float32(self.b)
+        columns = np.arange(w, dtype=np.float32)[None, :] * np.float32(self.a) + np.float32(self.c)
+        above: npt.NDArray[np.float32] = rows + columns
+        above *= depth
+        np.subtract(np.float32(1.0), above, out=above)
+        above *= np.float32(self.height)
+        return above
+
+    def row_at(self, u: float, z: float) -> float:
+        """Row in which the floor is seen in column ``u`` at depth ``z``."""
+        return (1.0 / z - self.c - self.a * u) / self.b
+
+
+def _height(planes: npt.NDArray[np.float64], k: Intrinsics) -> npt.NDArray[np.float64]:
+    """Distance of the camera from each plane, ``(n,)``; planes ``(n, 3)`` as ``a, b, c``."""
+    normal = np.stack(
+        (
+            planes[:, 0] * k.fx,
+            planes[:, 1] * k.fy,
+            planes[:, 2] + planes[:, 0] * k.cx + planes[:, 1] * k.cy,
+        ),
+        axis=1,
+    )
+    length = np.linalg.norm(normal, axis=1)
+    down = normal[:, 1] / np.maximum(length, 1e-12)
+    height = 1.0 / np.maximum(length, 1e-12)
+    good = (down > MIN_UPRIGHT) & (height > CAMERA_HEIGHT[0]) & (height < CAMERA_HEIGHT[1])
+    result: npt.NDArray[np.float64] = np.where(good, height, np.nan)
+    return result
+
+
+class FloorFinder:
+    """Finds the floor by sample consensus, then follows it from frame to frame by least squares."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._floor: Floor | None = None
+        self._wait = 0
+
+    def update(self, view: DepthView) -> Floor | None:
+        """The floor of this view, or None where no plane passes for one."""
+        h, w = view.shape
+        flat = view.depth.reshape(-1)
+        start = (h // 3) * w
+        index = start + self._rng.integers(0, h * w - start, SAMPLES)
+        z = flat[index].astype(np.float64)
+        valid = z > 0
+        index, z = index[valid], z[valid]
+        if len(z) < 60:
+            self._floor = None
+            return None
+        points = np.stack((index % w, index // w, np.ones(len(z))), axis=1).astype(np.float64)
+        if self._floor is not None:
+            f = self._floor
+            refined = self._refined(np.array([[f.a, f.b, f.c]]), points, z, view.intrinsics)
+            if refined is not None:
+                self._floor = refined
+                return refined
+        self._floor = None
+        if self._wait > 0:
+            self._wait -= 1
+            return None
+        self._floor = self._searched(points, z, view.intrinsics)
+        if self._floor is None:
+            self._wait = 5
+        return self._floor
+
+    def _searched(
+        self, points: npt.NDArray[np.float64], z: npt.NDArray[np.float64], k: Intrinsics
+    ) -> Floor | None:
+        triples = self._rng.integers(0, len(z), (TRIALS, 3))
+        matrices = points[triples]
+        regular = np.abs(np.linalg.det(matrices)) > 50.0
+        if not regular.any():
+            return None
+        inverse = 1.0 / z[triples[regular]]
+        planes = np.linalg.solve(matrices[regular], inverse[:, :, None])[:, :, 0]
+        heights = _height(planes, k)
+        planes = planes[np.isfinite(heights)]
+        heights = heights[np.isfinite(heights)]
+        if not len(planes):
+            return None
+        above = heights[:, None] * (1.0 - (planes @ points.T) * z)
+        width = 0.02 + 0.012 * z
+        on = (np.abs(above) < width).mean(axis=1)
+        below = (above < -2.5 * width).mean(axis=1)
+        score = on - 2.0 * below
+        best = int(np.argmax(score))
+        if score[best] < MIN_SHARE:
+            return None
+        return self._refined(planes[best : best + 1], points, z, k)
+
+    def _refined(
+        self,
+        plane: npt.NDArray[np.float64],
+        points: npt.NDArray[np.float64],
+        z: npt.NDArray[np.float64],
+        k: Intrinsics,
+    ) -> Floor | None:
+        """The plane fitted again to what lies on it, or None where too little does."""
+        width = 0.02 + 0.012 * z
+        for _ in range(2):
+            height = _height(plane, k)[0]
+            if not np.isfinite(height):
+                return None
+            above = height * (1.0 - (points @ plane[0]) * z)
+            on = np.abs(above) < width
+            if on.mean() < MIN_SHARE or (above < -2.5 * width).mean() > 0.5 * on.mean():
+                return None
+            # Weighted by depth, so that the fit is in metres rather than in inverse metres.
+            a = points[on] * z[on, None]
+            normal_matrix = a.T @ a + 1e-9 * np.eye(3)
+            plane = np.linalg.solve(normal_matrix, a.T @ np.ones(len(a)))[None, :]
+        height = _height(plane, k)[0]
+        if not np.isfinite(height):
+            return None
+        return Floor(float(plane[0, 0]), float(plane[0, 1]), float(plane[0, 2]), float(height))

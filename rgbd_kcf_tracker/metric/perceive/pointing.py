@@ -1,0 +1,118 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The thing a person points at: the connected surface at the depth of one pixel."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.errors import BoxError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
+from rgbd_kcf_tracker.metric.perceive.surfaces import cut, standing
+
+VIEW_WIDTH = 480
+"""Columns in which surfaces are looked for: a mug at two metres is still fifteen wide."""
+NEAREST = 0.02
+"""How far from the pixel a reading is accepted, as a share of the image's width."""
+BAND_M, BAND_SHARE = 0.25, 0.05
+"""Half the depth a surface may span round the pixel: an arm's length, and the sensor's noise."""
+JUMP_M, JUMP_SHARE = 0.03, 0.02
+FLOOR_MARGIN_M = 0.04
+LARGEST_SHARE = 0.6
+REACH = 3
+"""Rows up and down over which a surface's slope is measured."""
+LEVEL_SHARE = 0.4
+"""A surface is level where its height falls by less than this share of an upright one's."""
+TABLE_SHARE = 0.7
+LEAST_PIXELS = 30
+
+
+def surface_at(frame: Frame, u: float, v: float) -> Box:
+    """The box round the connected surface at a pixel of the colour image.
+
+    Args:
+        frame: with depth.
+        u: column.
+        v: row.
+
+    Raises:
+        BoxError: where the pixel is outside the image, has no depth, or belongs to a surface that
+            is a speck or fills the image.
+    """
+    if not (math.isfinite(u) and math.isfinite(v)) or not (
+        0 <= u < frame.width and 0 <= v < frame.height
+    ):
+        raise BoxError(f'point {u:g},{v:g} lies outside the {frame.width}x{frame.height} image')
+    view = DepthView.of(frame, VIEW_WIDTH)
+    if view is None:
+        raise BoxError('a point needs depth to become a box, and there is none: give a box instead')
+    row, column = _nearest(view.depth > 0, v / view.step, u / view.step, NEAREST)
+    if row < 0:
+        raise BoxError(f'there is no depth reading near point {u:g},{v:g}: point elsewhere')
+    depth = float(view.depth[row, column])
+    near = np.abs(view.depth - np.float32(depth)) < BAND_M + BAND_SHARE * depth
+    near &= view.depth > 0
+    floor = FloorFinder(0).update(view)
+    elevation = None if floor is None else floor.elevation(view.depth)
+    upright = standing(view, elevation, FLOOR_MARGIN_M)
+    if upright[row, column]:
+        near &= upright
+    found = _connected(view, near, row, column)
+    # What stands on a table is joined to it: without what is level, it comes apart.
+    steep = ~_level(view, elevation)
+    if steep[row, column]:
+        alone = _connected(view, near & steep, row, column)
+        if alone is not None and (found is None or alone.area < TABLE_SHARE * found.area):
+            found = alone
+    box = None if found is None else found.clipped(frame.width, frame.height)
+    if box is None:
+        raise BoxError(f'the surface at point {u:g},{v:g} is only a speck: point at its middle')
+    if box.area > LARGEST_SHARE * frame.width * frame.height:
+        raise BoxError(
+            f'the surface at point {u:g},{v:g} fills the image: point at the target, or give a box'
+        )
+    return box
+
+
+def _connected(view: DepthView, mask: npt.NDArray[np.bool_], row: int, column: int) -> Box | None:
+    """Box in the colour image of the part of ``mask`` that is connected to a pixel of the view."""
+    surfaces = cut(view.depth, mask, JUMP_M, JUMP_SHARE)
+    row, column = _nearest(surfaces.labels > 0, row, column, NEAREST)
+    label = int(surfaces.labels[row, column]) if row >= 0 else 0
+    if label == 0 or surfaces.pixels[label] < LEAST_PIXELS:
+        return None
+    return Box(*(float(side) * view.step for side in surfaces.boxes[label]))
+
+
+def _level(view: DepthView, elevation: npt.NDArray[np.float32] | None) -> npt.NDArray[np.bool_]:
+    """Pixels of surfaces that lie rather than stand: down the image, their height hardly falls."""
+    if elevation is None:
+        rows = np.arange(view.shape[0], dtype=np.float32)[:, None]
+        elevation = view.depth * ((view.intrinsics.cy - rows) / np.float32(view.intrinsics.fy))
+    fall = np.zeros(view.shape, np.float32)
+    fall[REACH:-REACH] = elevation[: -2 * REACH] - elevation[2 * REACH :]
+    upright_fall = view.depth * np.float32(2 * REACH / view.intrinsics.fy)
+    level: npt.NDArray[np.bool_] = fall < LEVEL_SHARE * upright_fall
+    return level
+
+
+def _nearest(
+    mask: npt.NDArray[np.bool_], row: float, column: float, reach: float
+) -> tuple[int, int]:
+    """Row and column of the set pixel nearest to a place, (-1, -1) where none is near."""
+    reach_pixels = max(math.ceil(reach * mask.shape[1]), 1)
+    top, left = max(int(row) - reach_pixels, 0), max(int(column) - reach_pixels, 0)
+    part = mask[top : int(row) + reach_pixels + 1, left : int(column) + reach_pixels + 1]
+    rows, columns = np.nonzero(part)
+    if not len(rows):
+        return -1, -1
+    distance = (rows + top - row) ** 2 + (columns + left - column) ** 2
+    best = int(np.argmin(distance))
+    return int(rows[best]) + top, int(columns[best]) + left

@@ -1,0 +1,103 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""All that one frame shows to a tracker of surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_lab
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
+
+SUDDEN = 4.0
+"""Change of median lightness (of 255) from one frame to the next that is a change of light."""
+LIGHT_STEP = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """One frame's depth, surfaces and colours at the resolution of the view.
+
+    Attributes:
+        view: the depth.
+        floor: the floor, or None where none was found.
+        surfaces: what stands on it.
+        rim: columns and rows of the view that never have a reading.
+        codes: ``(h, w)`` int32 colour codes.
+        lab: ``(h, w, 3)`` uint8 CIE Lab.
+    """
+
+    view: DepthView
+    floor: Floor | None
+    surfaces: Surfaces
+    rim: Rim
+    codes: npt.NDArray[np.int32]
+    lab: npt.NDArray[np.uint8]
+
+    def silhouette(self, label: int) -> Silhouette:
+        """One surface as a silhouette."""
+        left, top, width, height = (int(v) for v in self.surfaces.boxes[label])
+        mask = self.surfaces.labels[top : top + height, left : left + width] == label
+        return Silhouette.of(self.view, left, top, mask, label, self.rim)
+
+
+class SceneReader:
+    """Reads frames of one stream; what does not change between them is remembered.
+
+    Args:
+        width: columns of the view.
+        jump: metres of a depth step between two surfaces at no distance.
+        jump_per_metre: by how much that grows with each metre.
+        floor_margin: metres above the floor up to which a pixel is floor; 0 leaves the floor in.
+        seed: of the search for the floor.
+    """
+
+    def __init__(
+        self, width: int, jump: float, jump_per_metre: float, floor_margin: float, seed: int
+    ) -> None:
+        self._width = width
+        self._jump = jump
+        self._jump_per_metre = jump_per_metre
+        self._floor_margin = floor_margin
+        self._floors = FloorFinder(seed)
+        self._rim: Rim | None = None
+        self._shape: tuple[int, int] = (0, 0)
+        self._lightness: npt.NDArray[np.int16] | None = None
+        self._brighter = 0.0
+        self.last_view: DepthView | None = None
+
+    def read(self, frame: Frame) -> Scene | None:
+        """The scene of a frame, or None where it has no depth."""
+        view = DepthView.of(frame, self._width)
+        if view is None:
+            return None
+        self.last_view = view
+        if view.shape != self._shape:
+            self._rim, self._shape = None, view.shape
+        floor = self._floors.update(view) if self._floor_margin > 0 else None
+        elevation = floor.elevation(view.depth) if floor is not None else None
+        mask = standing(view, elevation, self._floor_margin)
+        surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
+        rim = Rim.of(view)
+        self._rim = rim if self._rim is None else rim.common(self._rim)
+        lab = view_lab(frame.color, view.step, view.shape)
+        codes = color_codes(lab, self._light(lab))
+        return Scene(view, floor, surfaces, self._rim, codes, lab)
+
+    def _light(self, lab: npt.NDArray[np.uint8]) -> float:
+        """How much brighter the scene is than at first, by sudden changes of all of it."""
+        lightness = lab[::LIGHT_STEP, ::LIGHT_STEP, 0].astype(np.int16)
+        if self._lightness is not None and self._lightness.shape == lightness.shape:
+            change = float(np.median(lightness - self._lightness))
+            if abs(change) >= SUDDEN:
+                self._brighter = float(np.clip(self._brighter + change, -128, 128))
+        self._lightness = lightness
+        return self._brighter

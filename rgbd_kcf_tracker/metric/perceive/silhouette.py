@@ -1,0 +1,189 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A part of a depth view that may be a body: its pixels, its place, and what cuts it off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+
+Mask = npt.NDArray[np.bool_]
+
+NEARER = 0.1
+NEARER_PER_METRE = 0.03
+"""Metres by which what lies beside a silhouette must be nearer to be hiding more of it."""
+RING = 2
+"""Pixels of the view beyond the outline in which something nearer is looked for."""
+CUT_SHARE = 0.3
+"""Share of one side's outline beside which something nearer must lie for that side to be cut."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rim:
+    """Columns and rows at the edges of a view in which there never is a reading.
+
+    A registered depth image often covers less than the colour image.
+    """
+
+    left: int = 0
+    top: int = 0
+    right: int = 0
+    bottom: int = 0
+
+    @classmethod
+    def of(cls, view: DepthView) -> Rim:
+        """The rim of one view."""
+        valid = view.depth > 0
+        rows, cols = view.shape
+        across = np.flatnonzero(valid.mean(axis=0) > 0.02)
+        down = np.flatnonzero(valid.mean(axis=1) > 0.02)
+        if not len(across) or not len(down):
+            return cls()
+        return cls(
+            int(across[0]), int(down[0]), int(cols - 1 - across[-1]), int(rows - 1 - down[-1])
+        )
+
+    def common(self, other: Rim) -> Rim:
+        """What is rim in both: holes come and go, the rim stays."""
+        return Rim(
+            min(self.left, other.left),
+            min(self.top, other.top),
+            min(self.right, other.right),
+            min(self.bottom, other.bottom),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Sides:
+    """Something for each side of a silhouette."""
+
+    left: bool
+    top: bool
+    right: bool
+    bottom: bool
+
+    @property
+    def any(self) -> bool:
+        """True where it holds for one side at least."""
+        return self.left or self.top or self.right or self.bottom
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Silhouette:
+    """Some pixels of a view, with the crop that holds them.
+
+    Attributes:
+        left, top: column and row of the crop in the view.
+        mask: ``(h, w)`` bool, the pixels within the crop; every edge of the crop has one.
+        label: the surface that it is as a whole, 0 where it is part of one or of several.
+        depth: mean depth in metres.
+        area: in square metres, seen from the camera.
+        cut: the sides on which something nearer, or the end of the image, may hide more of it.
+        metres: left, top, right and bottom in metres of the camera's frame, at ``depth``.
+    """
+
+    left: int
+    top: int
+    mask: Mask
+    label: int
+    depth: float
+    area: float
+    cut: Sides
+    metres: tuple[float, float, float, float]
+
+    def at_edge(self, view: DepthView, rim: Rim) -> bool:
+        """True where it reaches the end of what the camera sees."""
+        rows, cols = view.shape
+        return (
+            self.left <= 1 + rim.left
+            or self.top <= 1 + rim.top
+            or self.cols.stop >= cols - 1 - rim.right
+            or self.rows.stop >= rows - 1 - rim.bottom
+        )
+
+    @property
+    def rows(self) -> slice:
+        """Rows of the view that the crop covers."""
+        return slice(self.top, self.top + self.mask.shape[0])
+
+    @property
+    def cols(self) -> slice:
+        """Columns of the view that the crop covers."""
+        return slice(self.left, self.left + self.mask.shape[1])
+
+    @property
+    def width(self) -> float:
+        """Metres across."""
+        return self.metres[2] - self.metres[0]
+
+    @property
+    def height(self) -> float:
+        """Metres from top to bottom."""
+        return self.metres[3] - self.metres[1]
+
+    @classmethod
+    def of(
+        cls, view: DepthView, left: int, top: int, mask: Mask, label: int, rim: Rim
+    ) -> Silhouette:
+        """Measure the pixels of ``mask``, a crop at ``left, top`` of the view.
+
+        Args:
+            view: the depth.
+            left: column of the crop.
+            top: row of the crop.
+            mask: ``(h, w)`` bool with at least one pixel in each outer row and column.
+            label: of the surface, or 0.
+            rim: of the view, where an outline is cut off as at the image's edge.
+        """
+        rows, cols = mask.shape
+        depth = view.depth[top : top + rows, left : left + cols]
+        z = float(depth[mask].mean())
+        k = view.intrinsics
+        hidden = _hidden_sides(view, left, top, mask, z)
+        height, width = view.shape
+        cut = Sides(
+            hidden.left or left <= 1 + rim.left,
+            hidden.top or top <= 1 + rim.top,
+            hidden.right or left + cols >= width - 1 - rim.right,
+            hidden.bottom or top + rows >= height - 1 - rim.bottom,
+        )
+        metres = (
+            (left - k.cx) * z / k.fx,
+            (top - k.cy) * z / k.fy,
+            (left + cols - k.cx) * z / k.fx,
+            (top + rows - k.cy) * z / k.fy,
+        )
+        area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
+        return cls(left, top, mask, label, z, area, cut, metres)
+
+
+def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) -> Sides:
+    """The sides along which something nearer lies."""
+    rows, cols = mask.shape
+    height, width = view.shape
+    y0, x0 = max(0, top - RING), max(0, left - RING)
+    y1, x1 = min(height, top + rows + RING), min(width, left + cols + RING)
+    body = np.zeros((y1 - y0, x1 - x0), np.bool_)
+    body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
+    around = view.depth[y0:y1, x0:x1]
+    nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z)) & ~body
+    # Between two surfaces there often is a seam without a reading.
+    nearer = cv2.dilate(nearer.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
+
+    def hidden(dy: int, dx: int) -> bool:
+        shifted = np.zeros_like(body)
+        h, w = body.shape
+        shifted[max(0, dy) : h + min(0, dy), max(0, dx) : w + min(0, dx)] = body[
+            max(0, -dy) : h + min(0, -dy), max(0, -dx) : w + min(0, -dx)
+        ]
+        shifted &= ~body
+        total = int(np.count_nonzero(shifted))
+        return total > 0 and int(np.count_nonzero(nearer & shifted)) > CUT_SHARE * total
+
+    return Sides(hidden(0, -RING), hidden(-RING, 0), hidden(0, RING), hidden(RING, 0))

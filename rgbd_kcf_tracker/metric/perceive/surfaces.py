@@ -1,0 +1,97 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Depth cut into surfaces: connected pixels between which depth does not jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surfaces:
+    """The surfaces of a view; row ``i`` of each array is the surface labelled ``i``, 0 is none.
+
+    Attributes:
+        labels: ``(h, w)`` int32.
+        boxes: ``(n, 4)`` int32 left, top, width, height in pixels of the view.
+        pixels: ``(n,)`` int32 number of pixels.
+        depth: ``(n,)`` float32 mean depth in metres.
+        jump, jump_per_metre: the depth step at which they were cut.
+    """
+
+    labels: npt.NDArray[np.int32]
+    boxes: npt.NDArray[np.int32]
+    pixels: npt.NDArray[np.int32]
+    depth: npt.NDArray[np.float32]
+    jump: float
+    jump_per_metre: float
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    def areas(self, k: Intrinsics) -> npt.NDArray[np.float64]:
+        """Square metres of each surface as seen from a camera, ``(n,)``."""
+        z = self.depth.astype(np.float64)
+        result: npt.NDArray[np.float64] = self.pixels * z * z / (k.fx * k.fy)
+        return result
+
+
+def standing(
+    view: DepthView, elevation: npt.NDArray[np.float32] | None, margin: float
+) -> npt.NDArray[np.bool_]:
+    """Pixels with a reading that do not belong to the floor, ``(h, w)`` bool.
+
+    Args:
+        view: the depth.
+        elevation: metres above the floor, or None where no floor is known.
+        margin: metres above the floor up to which a pixel counts as floor, at one metre's distance;
+            it grows with the square root of depth as the sensor's noise takes its toll.
+    """
+    valid = view.depth > 0
+    if elevation is not None:
+        valid &= elevation > margin * np.sqrt(np.maximum(view.depth, 1.0))
+    return valid
+
+
+def cut(
+    depth: npt.NDArray[np.float32],
+    mask: npt.NDArray[np.bool_],
+    jump: float,
+    jump_per_metre: float,
+) -> Surfaces:
+    """Label the connected pixels of ``mask`` between which depth jumps by no more than allowed.
+
+    Args:
+        depth: ``(h, w)`` float32 metres.
+        mask: ``(h, w)`` bool, the pixels to label.
+        jump: metres two neighbours may differ, at no distance.
+        jump_per_metre: by how much that grows with each metre of depth.
+    """
+    allowed = depth * np.float32(jump_per_metre)
+    allowed += np.float32(jump)
+    # A jump takes the farther pixel away, so the nearer surface keeps its outline whole.
+    keep = mask.copy()
+    step = depth[:, 1:] - depth[:, :-1]
+    both = mask[:, 1:] & mask[:, :-1]
+    keep[:, 1:] &= ~((step > allowed[:, :-1]) & both)
+    keep[:, :-1] &= ~((-step > allowed[:, 1:]) & both)
+    step = depth[1:] - depth[:-1]
+    both = mask[1:] & mask[:-1]
+    keep[1:] &= ~((step > allowed[:-1]) & both)
+    keep[:-1] &= ~((-step > allowed[1:]) & both)
+    # Diagonal neighbours across a removed pixel must not join: 4-connectivity.
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        keep.view(np.uint8), connectivity=4, ltype=cv2.CV_32S
+    )
+    pixels = stats[:, cv2.CC_STAT_AREA]
+    sums = np.bincount(labels.ravel(), weights=depth.ravel(), minlength=count)
+    mean = (sums / np.maximum(pixels, 1)).astype(np.float32)
+    return Surfaces(labels, stats[:, :4], pixels, mean, jump, jump_per_metre)
