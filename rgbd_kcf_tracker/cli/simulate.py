@@ -249,5 +249,7 @@ def _folder(dest: Path, color_format: str) -> Iterator[WriteFrame]:
             folder.write(
                 simulated.frame, simulated.visible, simulated.body, simulated.visible_fraction
             )
+            if len(simulated.truths) > 1:
+                folder.write_people(simulated.truths)
 
         yield write

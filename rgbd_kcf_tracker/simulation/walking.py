@@ -1,0 +1,260 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How several people walk through a room at once: each has a plan, and they make way for another.
+
+A plan is a list of `Go`, `Stay` and `Away`. `rehearse` lets everybody carry out theirs, in steps
+of 50 ms, around the furniture and past each other, and gives each person's visits: the times in
+which they are there at all. Plain Python floats, so that the outcome is the same everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Union
+
+from rgbd_kcf_tracker.simulation.floorplan import FloorPlan, Point
+from rgbd_kcf_tracker.simulation.motion import Motion
+
+_STEP = 0.05  # seconds
+_TURN = 2.8  # radians a second at most
+_PATIENCE = 6.0  # seconds beyond the time a free way takes, after which a goal is given up
+
+
+@dataclass(frozen=True, slots=True)
+class Go:
+    """Walk to a place, around the furniture, or straight to it."""
+
+    to: Point
+    straight: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Stay:
+    """Stand, or sit, for a while.
+
+    Attributes:
+        seconds: how long.
+        facing: radians, None to look on as before.
+        sit: 1 to sit down.
+        spread: 0 to 1, arms out.
+        reach: 0 to 1, right hand held up.
+    """
+
+    seconds: float
+    facing: float | None = None
+    sit: float = 0.0
+    spread: float = 0.0
+    reach: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Away:
+    """Be gone for a while, then appear at a place that the camera does not see."""
+
+    seconds: float
+    back_at: Point
+
+
+Action = Union[Go, Stay, Away]
+
+
+@dataclass(frozen=True)
+class Walker:
+    """Somebody with a plan.
+
+    Attributes:
+        start: where they are at first.
+        facing: radians at first.
+        plan: what they do, one thing after the other; at its end they stand.
+        speed: metres a second.
+        stride: metres per two steps.
+        space: how near others may come, middle to middle, metres.
+    """
+
+    start: Point
+    facing: float
+    plan: Sequence[Action]
+    speed: float
+    stride: float
+    space: float = 0.5
+
+
+@dataclass(frozen=True)
+class Visit:
+    """A time in which somebody is there; with ``stays``, until the end of all and beyond."""
+
+    start: float
+    end: float
+    motion: Motion
+    stays: bool = False
+
+
+@dataclass
+class _State:
+    """A walker at one moment."""
+
+    walker: Walker
+    x: float
+    z: float
+    heading: float
+    vx: float = 0.0
+    vz: float = 0.0
+    sit: float = 0.0
+    step: int = -1
+    until: float = math.inf
+    way: list[Point] = field(default_factory=list)
+    here: bool = True
+    record: list[tuple[float, ...]] = field(default_factory=list)
+    visits: list[list[tuple[float, ...]]] = field(default_factory=list)
+
+    @property
+    def action(self) -> Action | None:
+        plan = self.walker.plan
+        return plan[self.step] if 0 <= self.step < len(plan) else None
+
+    def leave(self) -> None:
+        if self.record:
+            self.visits.append(self.record)
+        self.record, self.here = [], False
+
+
+def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list[list[Visit]]:
+    """Let everybody carry out their plans; each one's visits, in the order of ``walkers``."""
+    states = [_State(w, *w.start, w.facing) for w in walkers]
+    for k in range(math.ceil(seconds / _STEP) + 1):
+        t = k * _STEP
+        for state in states:
+            _decide(state, plan, t)
+        wishes = [_wish(state, states, plan) for state in states]
+        for state, (vx, vz) in zip(states, wishes, strict=True):
+            _move(state, vx, vz, plan)
+            if state.here:
+                action = state.action
+                stay = action if isinstance(action, Stay) else Stay(0)
+                state.record.append((t, state.x, state.z, state.heading, stay.sit, stay.spread,
+                                     stay.reach))  # fmt: skip
+    return [
+        [
+            *(_visit(record, state.walker.stride) for record in state.visits if len(record) > 3),
+            *([_visit(state.record, state.walker.stride, True)] if len(state.record) > 3 else []),
+        ]
+        for state in states
+    ]
+
+
+def _decide(state: _State, plan: FloorPlan, t: float) -> None:
+    """Go on to the next thing as soon as one is done."""
+    while state.step < len(state.walker.plan):
+        action = state.action
+        if isinstance(action, Go):
+            if state.way and t < state.until:
+                return
+        elif action is not None and t < state.until:
+            return
+        if isinstance(action, Away):
+            (state.x, state.z), state.vx, state.vz = action.back_at, 0.0, 0.0
+            state.here = True
+        state.step += 1
+        action = state.action
+        if isinstance(action, Go):
+            here = (state.x, state.z)
+            state.way = [action.to] if action.straight else plan.way(here, action.to)
+            length = sum(math.dist(a, b) for a, b in _pairs([here, *state.way]))
+            state.until = t + length / state.walker.speed + _PATIENCE
+            if len(state.record) == 0:
+                state.heading = _course(state.way[0][0] - state.x, state.way[0][1] - state.z)
+        elif action is not None:
+            state.until = t + action.seconds
+            if isinstance(action, Away):
+                state.leave()
+
+
+def _pairs(points: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
+    return zip(points, points[1:], strict=False)
+
+
+def _course(dx: float, dz: float) -> float:
+    return math.atan2(dx, -dz)
+
+
+def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[float, float]:
+    """The velocity that somebody would like to have now."""
+    action = state.action
+    if not state.here or not isinstance(action, Go) or not state.way:
+        return 0.0, 0.0
+    dx, dz = state.way[0][0] - state.x, state.way[0][1] - state.z
+    left = math.hypot(dx, dz)
+    if left < (0.08 if len(state.way) == 1 else 0.3):
+        state.way.pop(0)
+        return _wish(state, states, plan)
+    speed = state.walker.speed
+    if len(state.way) == 1:
+        speed *= min(1.0, 0.2 + left / 0.5)
+    ux, uz = dx / left, dz / left
+    vx, vz = ux * speed, uz * speed
+    for other in states:
+        if other is state or not other.here:
+            continue
+        rx, rz = other.x - state.x, other.z - state.z
+        gap = math.hypot(rx, rz)
+        room = (state.walker.space + other.walker.space) / 2
+        if gap > 4.0 or gap < 1e-6:
+            continue
+        if gap < room:  # too close: step back
+            vx -= rx / gap * (room - gap) * 5
+            vz -= rz / gap * (room - gap) * 5
+        sx, sz = ux * speed - other.vx, uz * speed - other.vz
+        square = sx * sx + sz * sz
+        if square < 1e-4:
+            continue
+        meet = (rx * sx + rz * sz) / square  # seconds until they are nearest
+        if not 0 < meet < 2.5 or (gap > left and math.hypot(other.vx, other.vz) < 0.1):
+            continue
+        nearest = math.hypot(rx - sx * meet, rz - sz * meet)
+        if nearest < room + 0.2:
+            aside = ux * rz - uz * rx  # positive: the other is to one side; go to the other
+            sign = -1.0 if aside > 0 else 1.0
+            strength = 1.3 * speed * (1 - nearest / (room + 0.2)) * (1 - meet / 2.5)
+            vx += -uz * sign * strength
+            vz += ux * sign * strength
+    limit = 1.3 * state.walker.speed / max(math.hypot(vx, vz), 1e-9)
+    return (vx * limit, vz * limit) if limit < 1 else (vx, vz)
+
+
+def _move(state: _State, vx: float, vz: float, plan: FloorPlan) -> None:
+    """One step towards a wished velocity."""
+    if not state.here:
+        return
+    state.vx += (vx - state.vx) * _STEP / 0.25
+    state.vz += (vz - state.vz) * _STEP / 0.25
+    action = state.action
+    if not isinstance(action, Go):
+        state.vx = state.vz = 0.0
+    state.x += state.vx * _STEP
+    state.z += state.vz * _STEP
+    if isinstance(action, Go) and not action.straight:
+        for f in plan.footprints:
+            f = f.grown(plan.reach - 0.03)
+            if f.holds(state.x, state.z):
+                state.x, state.z = f.pushed_out(state.x, state.z)
+    facing = action.facing if isinstance(action, Stay) else None
+    if math.hypot(state.vx, state.vz) > 0.25:
+        facing = _course(state.vx, state.vz)
+    if facing is not None:
+        turn = (facing - state.heading + math.pi) % (2 * math.pi) - math.pi
+        state.heading += min(max(turn * 0.35, -_TURN * _STEP), _TURN * _STEP)
+
+
+def _visit(record: list[tuple[float, ...]], stride: float, stays: bool = False) -> Visit:
+    t, x, z, heading, sit, spread, reach = (list(c) for c in zip(*record, strict=True))
+    channels = {
+        name: list(zip(t, values, strict=True))
+        for name, values in (('sit', sit), ('spread', spread), ('reach', reach))
+        if any(values)
+    }
+    motion = Motion(list(zip(t, x, z, strict=True)), heading=list(zip(t, heading, strict=True)),
+                    stride=stride, corner_s=0.1, channels=channels)  # fmt: skip
+    return Visit(t[0], t[-1], motion, stays)
