@@ -114,7 +114,6 @@ def _come_and_go(
     hall = Hall(stage)
     diaries = [_Diary(hall, person) for person in people]
     at_first = int(stage.rng.integers(2, 4))
-    seats = list(hall.seats)
     for k, diary in enumerate(diaries):
         if k < at_first:
             spot = hall.spot((1.9, 3.8), 0.65)
@@ -122,9 +121,8 @@ def _come_and_go(
                 if all(math.dist(spot, d.start) > 0.9 for d in diaries[:k]):
                     break
                 spot = hall.spot((1.9, 3.8), 0.65)
-            if k > 0 and seats and stage.rng.uniform() < 0.35:
-                seat = seats.pop()
-                hall.seats.remove(seat)
+            if k > 0 and hall.seats and stage.rng.uniform() < 0.35:
+                seat = hall.seats.pop()
                 diary.begin(seat.feet)
                 diary.facing = seat.facing
                 diary.stay(stage.uniform(3.0, 9.0), sit=1.0)
