@@ -120,6 +120,10 @@ class Hall:
                 break
         return x, far
 
+    def in_sight(self, place: Point) -> bool:
+        """Whether no furniture stands between the camera and somebody there."""
+        return not any(f.grown(0.1).cut_by((0.0, 0.0), place) for f in self.plan.footprints[2:])
+
     def _open_door(self) -> None:
         """Cut the wall at the back, and build what is seen behind it."""
         stage, room = self.stage, self.room

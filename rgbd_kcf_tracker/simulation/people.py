@@ -73,6 +73,7 @@ class Person:
         long_hair: hair down to the shoulders.
         hat: 0 none, 1 cap.
         backpack: wears one.
+        bag: ``'hand'`` or ``'shoulder'`` for one carried on the left, empty for none.
     """
 
     height: float
@@ -82,6 +83,7 @@ class Person:
     long_hair: bool = False
     hat: bool = False
     backpack: bool = False
+    bag: str = ''
 
     def solids(self, pose: Pose, parts: str = 'all') -> Solids:
         """The figure in the world frame; ``parts`` is ``'all'``, ``'head'`` or ``'body'``."""
@@ -179,7 +181,25 @@ class _Figure:
             for sign in (-1, 1):
                 self._arm(out, sign)
                 self._leg(out, sign)
+            if self.person.bag:
+                self._bag(out)
         return out.pack()
+
+    def _bag(self, out: SolidList) -> None:
+        h = self.unit
+        if self.person.bag == 'hand':
+            wrist = self.arm(-1)[2]
+            middle = wrist - self.up * 0.17 * h
+            out.limb(wrist - self.up * 0.03 * h, middle, 0.012 * h, 0.03 * h, EXTRA, self.forward)
+            out.ellipsoid(middle, -self.up * 0.095 * h, 0.1 * h, 0.045 * h, EXTRA, self.forward)
+            return
+        hip = self.pelvis + self.side * 0.115 * self.width - self.up * 0.01 * h
+        out.ellipsoid(hip, -self.up * 0.08 * h, 0.085 * h, 0.04 * h, EXTRA, self.forward)
+        across = self.chest - self.shoulder_side * 0.07 * self.width + self.trunk * 0.03 * h
+        for ahead in (0.075, -0.075):  # the strap, before and behind
+            middle = 0.5 * (hip + across) + self.forward * ahead * self.width
+            out.limb(across, middle, 0.009 * h, 0.009 * h, EXTRA, self.forward)
+            out.limb(middle, hip, 0.009 * h, 0.009 * h, EXTRA, self.forward)
 
     def _head(self, out: SolidList) -> None:
         h = self.unit

@@ -14,7 +14,7 @@ import numpy as np
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
-from rgbd_kcf_tracker.simulation.scene import Scene
+from rgbd_kcf_tracker.simulation.scene import Scene, Vector
 from rgbd_kcf_tracker.simulation.sensor import Sensor
 
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -127,6 +127,15 @@ class SimulatedSequence:
     def truths(self, index: int) -> dict[int, Truth]:
         """The truth about everybody with an id in one frame, without rendering its colours."""
         return Picture(self._backdrop, self._offsets_ns[index] * 1e-9, shade=False).truths()
+
+    def camera_pose(self, index: int) -> tuple[Vector, Vector]:
+        """The camera's rotation ``(3, 3)`` and place ``(3,)`` in metres at one frame.
+
+        A point of the optical frame is at ``rotation @ point + place`` in the room, whose axes are
+        right, down and forward, with the floor at 0 below the camera's first place.
+        """
+        rotation, place = self.scene.camera.at(self._offsets_ns[index] * 1e-9)
+        return rotation.T, place
 
     @property
     def people(self) -> tuple[int, ...]:

@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.simulation.motion import Motion
 
 _STEP = 0.05  # seconds
 _TURN = 2.8  # radians a second at most
+_BODY = 0.41  # share of the sum of two walkers' spaces that is never undercut
 _PATIENCE = 6.0  # seconds beyond the time a free way takes, after which a goal is given up
 
 
@@ -72,6 +73,7 @@ class Walker:
         speed: metres a second.
         stride: metres per two steps.
         space: how near others may come, middle to middle, metres.
+        sway: phase in radians of the small movements of somebody who stands.
     """
 
     start: Point
@@ -80,6 +82,7 @@ class Walker:
     speed: float
     stride: float
     space: float = 0.5
+    sway: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -131,11 +134,14 @@ def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list
         wishes = [_wish(state, states, plan) for state in states]
         for state, (vx, vz) in zip(states, wishes, strict=True):
             _move(state, vx, vz, plan)
+        _part(states)
+        for state in states:
             if state.here:
                 action = state.action
                 stay = action if isinstance(action, Stay) else Stay(0)
-                state.record.append((t, state.x, state.z, state.heading, stay.sit, stay.spread,
-                                     stay.reach))  # fmt: skip
+                dx, dz, turn = _sway(t, state.walker.sway, 0.3 if stay.sit else 1.0)
+                state.record.append((t, state.x + dx, state.z + dz, state.heading + turn, stay.sit,
+                                     stay.spread, stay.reach))  # fmt: skip
     return [
         [
             *(_visit(record, state.walker.stride) for record in state.visits if len(record) > 3),
@@ -143,6 +149,16 @@ def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list
         ]
         for state in states
     ]
+
+
+def _sway(t: float, phase: float, amount: float) -> tuple[float, float, float]:
+    """Nobody stands quite still: a centimetre or two, and a few degrees."""
+    slow, slower = math.sin(1.9 * t + phase), math.sin(0.8 * t + 2.3 * phase)
+    return (
+        amount * (0.008 * slow + 0.012 * slower),
+        amount * 0.012 * math.sin(1.3 * t + 1.7 * phase),
+        amount * (0.05 * slower + 0.03 * math.sin(2.7 * t + phase)),
+    )
 
 
 def _decide(state: _State, plan: FloorPlan, t: float) -> None:
@@ -187,7 +203,12 @@ def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[flo
         return 0.0, 0.0
     dx, dz = state.way[0][0] - state.x, state.way[0][1] - state.z
     left = math.hypot(dx, dz)
-    if left < (0.08 if len(state.way) == 1 else 0.3):
+    taken = len(state.way) == 1 and left < 1.2 * state.walker.space and any(
+        other is not state and other.here and not isinstance(other.action, Go)
+        and math.dist(state.way[0], (other.x, other.z)) < 0.8 * state.walker.space
+        for other in states
+    )  # fmt: skip
+    if taken or left < (0.08 if len(state.way) == 1 else 0.3):
         state.way.pop(0)
         return _wish(state, states, plan)
     speed = state.walker.speed
@@ -246,6 +267,24 @@ def _move(state: _State, vx: float, vz: float, plan: FloorPlan) -> None:
     if facing is not None:
         turn = (facing - state.heading + math.pi) % (2 * math.pi) - math.pi
         state.heading += min(max(turn * 0.35, -_TURN * _STEP), _TURN * _STEP)
+
+
+def _part(states: Sequence[_State]) -> None:
+    """Nobody walks through another: who walks is set back where two overlap."""
+    for i, a in enumerate(states):
+        for b in states[:i]:
+            if not (a.here and b.here):
+                continue
+            dx, dz = a.x - b.x, a.z - b.z
+            gap = math.hypot(dx, dz)
+            lack = _BODY * (a.walker.space + b.walker.space) - gap
+            movers = [s for s in (a, b) if isinstance(s.action, Go)]
+            if lack <= 0 or gap < 1e-6 or not movers:
+                continue
+            for s in movers:
+                sign = 1 if s is a else -1
+                s.x += sign * dx / gap * lack / len(movers)
+                s.z += sign * dz / gap * lack / len(movers)
 
 
 def _visit(record: list[tuple[float, ...]], stride: float, stays: bool = False) -> Visit:
