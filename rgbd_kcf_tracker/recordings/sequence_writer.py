@@ -140,9 +140,7 @@ class SequenceWriter:
             if truth.shown is not None:
                 clear = int(truth.visible_fraction >= CLEARLY_VISIBLE)
                 place = ','.join(f'{metres:.3f}' for metres in truth.position)
-                rows.append(
-                    f'{self._count},{person},{format_box(truth.shown)},{clear},{place}\n'
-                )
+                rows.append(f'{self._count},{person},{format_box(truth.shown)},{clear},{place}\n')
         self._write_line('mot.txt', ''.join(rows), end='')
 
     def close(self) -> None:

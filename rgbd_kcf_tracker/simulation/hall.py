@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A hall for several people: a doorway, room beyond both sides of the view, things in the middle."""
+"""A hall for several people: a doorway, room beside the view, things in the middle."""
 
 from __future__ import annotations
 
@@ -204,7 +204,9 @@ class Hall:
             return
         for side in (-1, 1):
             edge = print_.x0 if side < 0 else print_.x1
-            niche = Niche((edge + side * 0.55, z - 0.1), (edge + side * stage.uniform(0.2, 0.32), z))
+            niche = Niche(
+                (edge + side * 0.55, z - 0.1), (edge + side * stage.uniform(0.2, 0.32), z)
+            )
             if self.plan.free(*niche.front):
                 self.niches.append(niche)
 
@@ -215,14 +217,16 @@ class Hall:
             for f in piece.faces for p in (f.corner, f.corner + f.across, f.corner + f.down,
                                            f.corner + f.across + f.down)
         ]  # fmt: skip
-        points += [(float(o[0]) + s, float(o[2]) + s)
-                   for solids, _ in piece.plants for o in solids.origin for s in (-0.1, 0.1)]  # fmt: skip
+        points += [
+            (float(o[0]) + s, float(o[2]) + s)
+            for solids, _ in piece.plants for o in solids.origin for s in (-0.1, 0.1)
+        ]  # fmt: skip
         mine = footprint(points)
         door = Footprint(self.door - 0.9, self.stage.depth - 1.4, self.door + 0.9, 99.0)
         near = Footprint(-9.0, -9.0, 9.0, 1.5)
         kept = [door, near, *(f.grown(0.7) for f in self.plan.footprints[2:])]
-        kept += [Footprint(p[0] - 0.3, p[1] - 0.3, p[0] + 0.3, p[1] + 0.3)
-                 for p in (*(n.front for n in self.niches), *(s.front for s in self.seats))]  # fmt: skip
+        fronts = [place.front for place in (*self.niches, *self.seats)]
+        kept += [footprint([front]).grown(0.3) for front in fronts]
         if any(mine.meets(k) for k in kept):
             return None
         self.room.faces += piece.faces

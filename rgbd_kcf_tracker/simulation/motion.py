@@ -48,7 +48,8 @@ class Motion:
         heading: ``(seconds, radians)``; without it the figure looks where it goes.
         stride: metres per two steps.
         corner_s: smoothing of corners and of starting and stopping.
-        channels: further keys by `Pose` field (``crouch``, ``spread``, ``reach``, ``sit``), or ``lift``.
+        channels: further keys by `Pose` field (``crouch``, ``spread``, ``reach``, ``sit``), or
+            ``lift``.
         phase: of the gait at the start.
     """
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Scenarios of several people, each with an id: they come and go, meet, and are taken for another."""
+"""Scenarios of several people, each with an id, who come and go, meet, and cross."""
 
 from __future__ import annotations
 

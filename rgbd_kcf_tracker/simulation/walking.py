@@ -11,9 +11,10 @@ which they are there at all. Plain Python floats, so that the outcome is the sam
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Union
+from itertools import pairwise
+from typing import TypeAlias
 
 from rgbd_kcf_tracker.simulation.floorplan import FloorPlan, Point
 from rgbd_kcf_tracker.simulation.motion import Motion
@@ -59,7 +60,7 @@ class Away:
     back_at: Point
 
 
-Action = Union[Go, Stay, Away]
+Action: TypeAlias = 'Go | Stay | Away'
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,7 @@ def _decide(state: _State, plan: FloorPlan, t: float) -> None:
         if isinstance(action, Go):
             here = (state.x, state.z)
             state.way = [action.to] if action.straight else plan.way(here, action.to)
-            length = sum(math.dist(a, b) for a, b in _pairs([here, *state.way]))
+            length = sum(math.dist(a, b) for a, b in pairwise([here, *state.way]))
             state.until = t + length / state.walker.speed + _PATIENCE
             if len(state.record) == 0:
                 state.heading = _course(state.way[0][0] - state.x, state.way[0][1] - state.z)
@@ -186,10 +187,6 @@ def _decide(state: _State, plan: FloorPlan, t: float) -> None:
             state.until = t + action.seconds
             if isinstance(action, Away):
                 state.leave()
-
-
-def _pairs(points: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
-    return zip(points, points[1:], strict=False)
 
 
 def _course(dx: float, dz: float) -> float:
