@@ -96,10 +96,12 @@ class Hall:
             return Exit(name, (self.door, stage.depth - 0.45),
                         (self.door + inner * 1.35, stage.depth + 0.75))  # fmt: skip
         sign = -1 if name == 'left' else 1
-        far = (stage.half_width - 1.2) / stage.half_tan
+        # a camera that looks down sees feet farther out than heads
+        along, lower = math.cos(stage.pitch), stage.camera_height * max(math.sin(stage.pitch), 0.0)
+        far = ((stage.half_width - 1.2) / stage.half_tan - lower) / along
         for _ in range(20):
             z = stage.uniform(0.95, min(far, 3.6))
-            inside, outside = stage.x(0.85, z), stage.x(1.0, z) + 0.75
+            inside, outside = stage.x(0.85, z), stage.x(1.0, z * along + lower) + 0.75
             if self.plan.free(sign * inside, z) and self.plan.free(sign * outside, z):
                 break
         return Exit(name, (sign * inside, z), (sign * outside, z))

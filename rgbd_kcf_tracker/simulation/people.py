@@ -189,9 +189,9 @@ class _Figure:
         h = self.unit
         if self.person.bag == 'hand':
             wrist = self.arm(-1)[2]
-            middle = wrist - self.up * 0.17 * h
+            middle = wrist - self.up * 0.14 * h
             out.limb(wrist - self.up * 0.03 * h, middle, 0.012 * h, 0.03 * h, EXTRA, self.forward)
-            out.ellipsoid(middle, -self.up * 0.095 * h, 0.1 * h, 0.045 * h, EXTRA, self.forward)
+            out.ellipsoid(middle, -self.up * 0.07 * h, 0.09 * h, 0.035 * h, EXTRA, self.forward)
             return
         hip = self.pelvis + self.side * 0.115 * self.width - self.up * 0.01 * h
         out.ellipsoid(hip, -self.up * 0.08 * h, 0.085 * h, 0.04 * h, EXTRA, self.forward)

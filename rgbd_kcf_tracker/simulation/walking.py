@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.simulation.motion import Motion
 _STEP = 0.05  # seconds
 _TURN = 2.8  # radians a second at most
 _BODY = 0.41  # share of the sum of two walkers' spaces that is never undercut
-_PATIENCE = 6.0  # seconds beyond the time a free way takes, after which a goal is given up
+_PATIENCE = 4.0  # seconds beyond the time a free way takes, after which one squeezes through
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +111,7 @@ class _State:
     until: float = math.inf
     way: list[Point] = field(default_factory=list)
     here: bool = True
+    squeezes: bool = False
     record: list[tuple[float, ...]] = field(default_factory=list)
     visits: list[list[tuple[float, ...]]] = field(default_factory=list)
 
@@ -167,7 +168,8 @@ def _decide(state: _State, plan: FloorPlan, t: float) -> None:
     while state.step < len(state.walker.plan):
         action = state.action
         if isinstance(action, Go):
-            if state.way and t < state.until:
+            state.squeezes = t > state.until
+            if state.way:
                 return
         elif action is not None and t < state.until:
             return
@@ -175,6 +177,7 @@ def _decide(state: _State, plan: FloorPlan, t: float) -> None:
             (state.x, state.z), state.vx, state.vz = action.back_at, 0.0, 0.0
             state.here = True
         state.step += 1
+        state.squeezes = False
         action = state.action
         if isinstance(action, Go):
             here = (state.x, state.z)
@@ -214,7 +217,7 @@ def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[flo
     ux, uz = dx / left, dz / left
     vx, vz = ux * speed, uz * speed
     for other in states:
-        if other is state or not other.here:
+        if other is state or not other.here or state.squeezes:
             continue
         rx, rz = other.x - state.x, other.z - state.z
         gap = math.hypot(rx, rz)
@@ -253,7 +256,7 @@ def _move(state: _State, vx: float, vz: float, plan: FloorPlan) -> None:
         state.vx = state.vz = 0.0
     state.x += state.vx * _STEP
     state.z += state.vz * _STEP
-    if isinstance(action, Go) and not action.straight:
+    if isinstance(action, Go) and not (action.straight or state.squeezes):
         for f in plan.footprints:
             f = f.grown(plan.reach - 0.03)
             if f.holds(state.x, state.z):
@@ -270,7 +273,7 @@ def _part(states: Sequence[_State]) -> None:
     """Nobody walks through another: who walks is set back where two overlap."""
     for i, a in enumerate(states):
         for b in states[:i]:
-            if not (a.here and b.here):
+            if not (a.here and b.here) or a.squeezes or b.squeezes:
                 continue
             dx, dz = a.x - b.x, a.z - b.z
             gap = math.hypot(dx, dz)
