@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from rgbd_kcf_tracker.simulation.actors import VisitorActor
 from rgbd_kcf_tracker.simulation.floorplan import Point
@@ -21,6 +22,7 @@ from rgbd_kcf_tracker.simulation.walking import Action, Away, Go, Stay, Visit, W
 LONG_S = 45.0
 ABSENCE_S = (6.0, 25.0)
 PAN_SPEED = math.radians(23)
+several = partial(scenario, several=True)
 
 
 class _Diary:
@@ -156,7 +158,7 @@ def _come_and_go(hall: Hall, people: list[Person], seconds: float) -> list[_Diar
     diaries = [_Diary(hall, person) for person in people]
     at_first = int(stage.rng.integers(2, 4))
     # spread over time, so that the view is never empty for long
-    latest = seconds - 18.0
+    latest = seconds - 20.0
     leaving = [4.0 + (latest - 4.0) * (k + stage.uniform(0.1, 0.9)) / len(people)
                for k in range(len(people))]  # fmt: skip
     order = [int(k) for k in stage.rng.permutation(len(people))]
@@ -171,7 +173,7 @@ def _come_and_go(hall: Hall, people: list[Person], seconds: float) -> list[_Diar
             while diary.now < until:
                 diary.do_something()
             away = stage.uniform(*ABSENCE_S)
-            left = seconds - 9.0 - diary.now
+            left = seconds - 12.0 - diary.now  # to be seen again for some seconds
             if not returned:
                 away = max(ABSENCE_S[0], min(away, left))
             elif away > left:  # nobody would see them come back
@@ -216,14 +218,14 @@ def _people(stage: Stage, low: int, high: int) -> list[Person]:
     return people
 
 
-@scenario('4 to 6 people leave the view through the sides or a door and come back elsewhere')
+@several('4 to 6 people leave the view through the sides or a door and come back elsewhere')
 def comers(stage: Stage) -> Scene:
     """Absences of 6 to 25 s."""
     hall = _hall(stage)
     return _scene(hall, _come_and_go(hall, _people(stage, 4, 6), LONG_S), LONG_S)
 
 
-@scenario('as comers; two wear the same clothes and differ in height and build alone')
+@several('as comers; two wear the same clothes and differ in height and build alone')
 def comers_twins(stage: Stage) -> Scene:
     """The first is one of them."""
     people = _people(stage, 4, 6)
@@ -238,7 +240,7 @@ def comers_twins(stage: Stage) -> Scene:
     return _scene(hall, _come_and_go(hall, [people[k] for k in order], LONG_S), LONG_S)
 
 
-@scenario('as comers; the light falls or changes its colour while the target is away')
+@several('as comers; the light falls or changes its colour while the target is away')
 def comers_dusk(stage: Stage) -> Scene:
     """Over seconds, or at once as with a lamp; the exposure has made up for what it can."""
     hall = _hall(stage)
@@ -267,7 +269,7 @@ def _dusk(stage: Stage, visits: list[Visit]) -> Callable[[float], Gain]:
     return light
 
 
-@scenario('the target leaves for 30 s and comes back in another place; others remain')
+@several('the target leaves for 30 s and comes back in another place; others remain')
 def reunion(stage: Stage) -> Scene:
     """Perhaps a stranger enters meanwhile, where the target left."""
     hall = _hall(stage)
@@ -292,7 +294,7 @@ def reunion(stage: Stage) -> Scene:
     return _scene(hall, diaries, seconds)
 
 
-@scenario('a group crosses, stands together, touches, and walks on side by side')
+@several('a group crosses, stands together, touches, and walks on side by side')
 def group_crossing(stage: Stage) -> Scene:
     """Nobody leaves for long; everybody hides everybody."""
     hall = _hall(stage)
@@ -336,7 +338,7 @@ def group_crossing(stage: Stage) -> Scene:
     return _scene(hall, diaries, seconds)
 
 
-@scenario('a camera turns to and fro at 23 degrees a second among people who stand, sit and walk')
+@several('a camera turns to and fro at 23 degrees a second among people who stand, sit and walk')
 def lookaround(stage: Stage) -> Scene:
     """They leave the view because the camera does."""
     hall = _hall(stage)
