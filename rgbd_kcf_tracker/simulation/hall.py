@@ -227,7 +227,7 @@ class Hall:
         door = Footprint(self.door - 0.9, self.stage.depth - 1.4, self.door + 0.9, 99.0)
         near = Footprint(-9.0, -9.0, 9.0, 1.5)
         kept = [door, near, *(f.grown(0.7) for f in self.plan.footprints[2:])]
-        fronts = [place.front for place in (*self.niches, *self.seats)]
+        fronts = [*(niche.front for niche in self.niches), *(seat.front for seat in self.seats)]
         kept += [footprint([front]).grown(0.3) for front in fronts]
         if any(mine.meets(k) for k in kept):
             return None
