@@ -21,7 +21,8 @@ from rgbd_kcf_tracker.simulation.motion import Motion
 
 _STEP = 0.05  # seconds
 _TURN = 2.8  # radians a second at most
-_BODY = 0.41  # share of the sum of two walkers' spaces that is never undercut
+_SPACE = 0.5  # metres between two middles that walkers would like to keep
+_TOUCH = 0.41  # metres that they never undercut
 _PATIENCE = 4.0  # seconds beyond the time a free way takes, after which one squeezes through
 
 
@@ -41,14 +42,12 @@ class Stay:
         seconds: how long.
         facing: radians, None to look on as before.
         sit: 1 to sit down.
-        spread: 0 to 1, arms out.
         reach: 0 to 1, right hand held up.
     """
 
     seconds: float
     facing: float | None = None
     sit: float = 0.0
-    spread: float = 0.0
     reach: float = 0.0
 
 
@@ -73,7 +72,6 @@ class Walker:
         plan: what they do, one thing after the other; at its end they stand.
         speed: metres a second.
         stride: metres per two steps.
-        space: how near others may come, middle to middle, metres.
         sway: phase in radians of the small movements of somebody who stands.
     """
 
@@ -82,7 +80,6 @@ class Walker:
     plan: Sequence[Action]
     speed: float
     stride: float
-    space: float = 0.5
     sway: float = 0.0
 
 
@@ -106,7 +103,6 @@ class _State:
     heading: float
     vx: float = 0.0
     vz: float = 0.0
-    sit: float = 0.0
     step: int = -1
     until: float = math.inf
     way: list[Point] = field(default_factory=list)
@@ -133,7 +129,7 @@ def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list
         t = k * _STEP
         for state in states:
             _decide(state, plan, t)
-        wishes = [_wish(state, states, plan) for state in states]
+        wishes = [_wish(state, states) for state in states]
         for state, (vx, vz) in zip(states, wishes, strict=True):
             _move(state, vx, vz, plan)
         _part(states)
@@ -142,8 +138,9 @@ def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list
                 action = state.action
                 stay = action if isinstance(action, Stay) else Stay(0)
                 dx, dz, turn = _sway(t, state.walker.sway, 0.3 if stay.sit else 1.0)
-                state.record.append((t, state.x + dx, state.z + dz, state.heading + turn, stay.sit,
-                                     stay.spread, stay.reach))  # fmt: skip
+                state.record.append(
+                    (t, state.x + dx, state.z + dz, state.heading + turn, stay.sit, stay.reach)
+                )
     return [
         [
             *(_visit(record, state.walker.stride) for record in state.visits if len(record) > 3),
@@ -196,21 +193,21 @@ def _course(dx: float, dz: float) -> float:
     return math.atan2(dx, -dz)
 
 
-def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[float, float]:
+def _wish(state: _State, states: Sequence[_State]) -> tuple[float, float]:
     """The velocity that somebody would like to have now."""
     action = state.action
     if not state.here or not isinstance(action, Go) or not state.way:
         return 0.0, 0.0
     dx, dz = state.way[0][0] - state.x, state.way[0][1] - state.z
     left = math.hypot(dx, dz)
-    taken = len(state.way) == 1 and left < 1.2 * state.walker.space and any(
+    taken = len(state.way) == 1 and left < 1.2 * _SPACE and any(
         other is not state and other.here and not isinstance(other.action, Go)
-        and math.dist(state.way[0], (other.x, other.z)) < 0.8 * state.walker.space
+        and math.dist(state.way[0], (other.x, other.z)) < 0.8 * _SPACE
         for other in states
     )  # fmt: skip
     if taken or left < (0.08 if len(state.way) == 1 else 0.3):
         state.way.pop(0)
-        return _wish(state, states, plan)
+        return _wish(state, states)
     speed = state.walker.speed
     if len(state.way) == 1:
         speed *= min(1.0, 0.2 + left / 0.5)
@@ -221,12 +218,11 @@ def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[flo
             continue
         rx, rz = other.x - state.x, other.z - state.z
         gap = math.hypot(rx, rz)
-        room = (state.walker.space + other.walker.space) / 2
         if gap > 4.0 or gap < 1e-6:
             continue
-        if gap < room:  # too close: step back
-            vx -= rx / gap * (room - gap) * 5
-            vz -= rz / gap * (room - gap) * 5
+        if gap < _SPACE:  # too close: step back
+            vx -= rx / gap * (_SPACE - gap) * 5
+            vz -= rz / gap * (_SPACE - gap) * 5
         sx, sz = ux * speed - other.vx, uz * speed - other.vz
         square = sx * sx + sz * sz
         if square < 1e-4:
@@ -235,10 +231,10 @@ def _wish(state: _State, states: Sequence[_State], plan: FloorPlan) -> tuple[flo
         if not 0 < meet < 2.5 or (gap > left and math.hypot(other.vx, other.vz) < 0.1):
             continue
         nearest = math.hypot(rx - sx * meet, rz - sz * meet)
-        if nearest < room + 0.2:
+        if nearest < _SPACE + 0.2:
             aside = ux * rz - uz * rx  # positive: the other is to one side; go to the other
             sign = -1.0 if aside > 0 else 1.0
-            strength = 1.3 * speed * (1 - nearest / (room + 0.2)) * (1 - meet / 2.5)
+            strength = 1.3 * speed * (1 - nearest / (_SPACE + 0.2)) * (1 - meet / 2.5)
             vx += -uz * sign * strength
             vz += ux * sign * strength
     limit = 1.3 * state.walker.speed / max(math.hypot(vx, vz), 1e-9)
@@ -277,7 +273,7 @@ def _part(states: Sequence[_State]) -> None:
                 continue
             dx, dz = a.x - b.x, a.z - b.z
             gap = math.hypot(dx, dz)
-            lack = _BODY * (a.walker.space + b.walker.space) - gap
+            lack = _TOUCH - gap
             movers = [s for s in (a, b) if isinstance(s.action, Go)]
             if lack <= 0 or gap < 1e-6 or not movers:
                 continue
@@ -288,10 +284,10 @@ def _part(states: Sequence[_State]) -> None:
 
 
 def _visit(record: list[tuple[float, ...]], stride: float, stays: bool = False) -> Visit:
-    t, x, z, heading, sit, spread, reach = (list(c) for c in zip(*record, strict=True))
+    t, x, z, heading, sit, reach = (list(c) for c in zip(*record, strict=True))
     channels = {
         name: list(zip(t, values, strict=True))
-        for name, values in (('sit', sit), ('spread', spread), ('reach', reach))
+        for name, values in (('sit', sit), ('reach', reach))
         if any(values)
     }
     motion = Motion(list(zip(t, x, z, strict=True)), heading=list(zip(t, heading, strict=True)),
