@@ -13,6 +13,7 @@ import pytest
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
+from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 from rgbd_kcf_tracker.simulation import SCENARIOS, simulate
 
 SMALL = ['--size', '160x90', '--rate', '2']
@@ -50,6 +51,45 @@ def assert_same_box(a: Box | None, b: Box | None) -> None:
         assert a is b
     else:
         assert np.allclose(a.as_tuple(), b.as_tuple(), atol=0.01)
+
+
+def test_several_people_are_written_with_ids(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dest = tmp_path / 'room'
+    assert run(dest, '--scenario', 'comers', '--seed', 4, '--duration', 12, *SMALL) == 0
+    expected = list(simulate('comers', 4, 2.0, 12.0, size=(160, 90)))
+    people = list(expected[0].truths)
+    assert f'{len(people)} people' in capsys.readouterr().out
+    rows = [
+        [float(cell) for cell in line.split(',')]
+        for line in (dest / 'mot.txt').read_text().splitlines()
+    ]
+    wanted = [
+        (number, person, truth)
+        for number, simulated in enumerate(expected, 1)
+        for person, truth in simulated.truths.items()
+        if truth.shown is not None
+    ]
+    assert len(rows) == len(wanted)
+    for row, (number, person, truth) in zip(rows, wanted, strict=True):
+        assert row[:2] == [number, person]
+        assert truth.shown is not None
+        assert row[2:6] == pytest.approx(truth.shown.as_tuple(), abs=0.01)
+        assert row[6] == (truth.visible_fraction >= 0.4)
+        assert row[7:] == pytest.approx(truth.position, abs=0.001)
+    assert {row[6] for row in rows} == {0.0, 1.0}
+    for person in people:
+        files = [dest / f'{kind}_{person}.txt' for kind in ('groundtruth', 'body', 'visible')]
+        boxes, bodies = read_boxes(files[0]), read_boxes(files[1])
+        shares = [float(line.split(',')[0]) for line in files[2].read_text().splitlines()]
+        for box, body, share, simulated in zip(boxes, bodies, shares, expected, strict=True):
+            truth = simulated.truths[person]
+            assert_same_box(box, truth.visible)
+            assert_same_box(body, truth.body)
+            assert share == pytest.approx(truth.visible_fraction, abs=1e-4)
+    with open_recording(dest, ReadOptions()) as recording:  # the target's is that of person 1
+        assert recording.groundtruth == read_boxes(dest / 'groundtruth_1.txt')
 
 
 def test_kinect2_topics(tmp_path: Path) -> None:
@@ -133,4 +173,7 @@ def test_contact_sheet(tmp_path: Path) -> None:
     for tile in range(9):
         assert green[:, tile * width // 9 : (tile + 1) * width // 9].any(), tile
     assert height < 200
+    # of several people, the others' boxes are red
+    assert run('--contact-sheet', path, '--overwrite', '--scenario', 'group_crossing', *SMALL) == 0
+    assert np.all(cv2.imread(str(path)) == (80, 80, 240), axis=2).any()
     assert run('--contact-sheet', tmp_path / 'sheet.gif', *SMALL) == 2

@@ -125,6 +125,14 @@ def test_several_people_in_one_folder(tmp_path: Path):
     assert (opened.start, len(samples), opened.total) == (3, 9 + 15 - 3 + 1, 40)
     assert samples[0].frame.color[0, 0, 0] == 30
     assert len(list(bob.open().samples)) == 40
+    assert not opened.has_body
+    (path / 'body_ann.txt').write_text('0,0,19,29\n' * 40)
+    with_body, bob_again = open_dataset(str(path))
+    assert with_body.identity != ann.identity
+    assert bob_again.identity == bob.identity
+    opened = with_body.open()
+    assert opened.has_body
+    assert {s.body for s in opened.samples} == {Box(0, 0, 19, 29)}
 
 
 def test_scenes_that_simulate_wrote_are_grouped_by_scenario(own: Path):
@@ -376,6 +384,9 @@ def test_simulated_scenes_by_name():
     ]  # fmt: skip
     every = open_dataset('sim:all', DatasetOptions(scenarios=('occlusion', 'motion')))
     assert {s.scenario for s in every} == {'occlusion', 'motion'}
+    people = {s.scenario for s in open_dataset('sim:people')}
+    assert {'comers', 'reunion'} <= people
+    assert not people & {s.scenario for s in open_dataset('sim:all')}
     with pytest.raises(DatasetError, match="unknown scenario 'nothing'"):
         open_dataset('sim:nothing')
 

@@ -209,7 +209,7 @@ def test_same_seed_same_frames_in_any_order() -> None:
     assert not np.array_equal(other.frame.color, one[0].frame.color)
 
 
-@pytest.mark.parametrize('name', ['camera_motion', 'light_change', 'missing_depth'])
+@pytest.mark.parametrize('name', ['camera_motion', 'light_change', 'missing_depth', 'lookaround'])
 def test_rates_sample_the_same_world(name: str) -> None:
     fast = simulate(name, seed=2, rate_hz=30, size=SMALL)
     slow = simulate(name, seed=2, rate_hz=5, size=SMALL)
@@ -226,7 +226,7 @@ def test_rates_sample_the_same_world(name: str) -> None:
 @pytest.mark.parametrize('name', SCENARIOS)
 def test_every_scenario_renders_with_truth_that_agrees(name: str) -> None:
     sequence = simulate(name, seed=1, rate_hz=2, size=SMALL)
-    assert 3.0 <= len(sequence) / 2 <= 14.0
+    assert 3.0 <= len(sequence) / 2 <= (65.0 if SCENARIOS[name].several else 14.0)
     truths = []
     for simulated in sequence:
         frame, visible, body = simulated.frame, simulated.visible, simulated.body
@@ -249,7 +249,8 @@ def test_every_scenario_renders_with_truth_that_agrees(name: str) -> None:
         truths.append(simulated.truth)
     assert truths[0].visible is not None
     assert truths[0].visible_fraction > 0.5
-    assert sum(t.visible is not None for t in truths) > 0.3 * len(truths)
+    seen = 0.2 if name == 'reunion' else 0.3  # away for 30 s
+    assert sum(t.visible is not None for t in truths) > seen * len(truths)
     assert sequence.truth(1) == truths[1]
 
 

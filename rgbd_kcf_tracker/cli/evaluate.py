@@ -32,7 +32,8 @@ _EPILOG = """\
 data sets:
   DIR                 a sequence folder, or a folder of them: our own layout, OTB, VOT, CDTB,
                       DepthTrack or Princeton, found out by their file names; or a bag with truth
-  sim:all             every simulated scene; sim:occlusion,crowd some; sim:all:1-5 with these seeds
+  sim:all             every simulated scene of one target, sim:people those of several people;
+                      sim:occlusion,crowd some; sim:all:1-5 with these seeds
 
 trackers:
   --variants          kcf, rgbd, rgbd_pf, metric, and OpenCV's opencv:kcf, opencv:csrt, opencv:mil

@@ -29,6 +29,7 @@ examples:
   rgbd-kcf simulate walk.mcap --scenario occlusion --seed 3
   rgbd-kcf simulate walk/ --scenario fast_motion --rate 5
   rgbd-kcf simulate scenes/ --scenario all --seed 100 --count 2
+  rgbd-kcf simulate people/ --scenario people --rate 10 --size 640x480 --color-format jpg
   rgbd-kcf simulate --contact-sheet scenes.jpg --scenario all --rate 5
 """
 
@@ -49,7 +50,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--scenario',
         action='append',
         metavar='NAME',
-        help="what happens (default: normal); may be given again; 'all' for every scenario",
+        help="what happens (default: normal); may be given again; 'all' for every "
+        "scenario of one target, 'people' for those of several people with ids",
     )
     parser.add_argument(
         '--seed', type=int, default=0, metavar='N', help='of everything random (default: 0)'
@@ -68,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--duration',
         type=float,
         metavar='S',
-        help="seconds (default: the scene's own length, 4 to 10)",
+        help="seconds (default: the scene's own length, 4 to 10, or up to 60 with several people)",
     )
     parser.add_argument(
         '--size',
@@ -110,7 +112,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record what was asked for."""
-    from rgbd_kcf_tracker.simulation import SCENARIOS, check_request, simulate
+    from rgbd_kcf_tracker.simulation import SCENARIOS, check_request, expand_names, simulate
 
     if args.list:
         width = max(map(len, SCENARIOS))
@@ -123,9 +125,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.count < 1:
         raise ParameterError(f'--count is {args.count}: give 1 or more')
-    names = list(dict.fromkeys(args.scenario or ['normal']))
-    if 'all' in names:
-        names = list(SCENARIOS)
+    names = expand_names(args.scenario or ['normal'])
     size = _parse_size(args.size)
     for name in names:  # find every mistake before anything is written
         check_request(name, args.seed, args.rate, args.duration, size)
@@ -218,8 +218,9 @@ def _record(
         for simulated in progress(sequence, len(sequence), title):
             write(simulated)
             hidden += simulated.visible is None
+    people = f'{len(sequence.people)} people, ' if len(sequence.people) > 1 else ''
     print(
-        f'{dest}: {title}: {len(sequence)} frames at {sequence.rate_hz:g} Hz, '
+        f'{dest}: {title}: {len(sequence)} frames at {sequence.rate_hz:g} Hz, {people}'
         f'the target hidden in {hidden}',
         flush=True,
     )
@@ -249,5 +250,7 @@ def _folder(dest: Path, color_format: str) -> Iterator[WriteFrame]:
             folder.write(
                 simulated.frame, simulated.visible, simulated.body, simulated.visible_fraction
             )
+            if len(simulated.truths) > 1:
+                folder.write_people(simulated.truths)
 
         yield write

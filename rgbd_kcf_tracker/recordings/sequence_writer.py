@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any, Protocol, TextIO
 
 import cv2
 import numpy.typing as npt
@@ -20,6 +21,33 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.results import cannot_write, open_for_writing
 from rgbd_kcf_tracker.recordings.textfiles import format_box
+
+CLEARLY_VISIBLE = 0.4
+"""Below this share of a person, ``mot.txt`` marks the box as neither hit nor miss."""
+
+
+class PersonTruth(Protocol):
+    """Where one of several people is in a frame."""
+
+    @property
+    def shown(self) -> Box | None:
+        """Box of all that shows, however little."""
+
+    @property
+    def visible(self) -> Box | None:
+        """Box of the visible part, None where the person counts as absent."""
+
+    @property
+    def body(self) -> Box | None:
+        """Box of the whole body."""
+
+    @property
+    def visible_fraction(self) -> float:
+        """Visible share, 0 to 1."""
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """In the camera's optical frame, metres."""
 
 
 class SequenceWriter:
@@ -86,6 +114,35 @@ class SequenceWriter:
         if visible_fraction is not None:
             self._write_line('visible.txt', f'{visible_fraction:.4f}')
 
+    def write_people(self, people: Mapping[int, PersonTruth]) -> None:
+        """Write where everybody is in the frame that was written last.
+
+        A person ``7`` gets a line in ``groundtruth_7.txt``, ``body_7.txt`` and ``visible_7.txt``
+        (visible share, distance in millimetres); who shows gets one in ``mot.txt``, MOT Challenge
+        text: ``frame,id,x,y,width,height,conf,X,Y,Z``, frames from 1, the box of what shows, the
+        position in metres in the camera's optical frame. ``conf`` is 1, or 0 where less than
+        `CLEARLY_VISIBLE` of the person shows.
+
+        Args:
+            people: by id; give the same ids with every frame.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+        rows = []
+        for person, truth in people.items():
+            self._write_line(f'groundtruth_{person}.txt', format_box(truth.visible))
+            self._write_line(f'body_{person}.txt', format_box(truth.body))
+            seen = truth.shown is not None
+            distance = truth.position[2] * 1000 if seen else 0
+            self._write_line(f'visible_{person}.txt',
+                             f'{truth.visible_fraction:.4f},{distance:.0f}')  # fmt: skip
+            if truth.shown is not None:
+                clear = int(truth.visible_fraction >= CLEARLY_VISIBLE)
+                place = ','.join(f'{metres:.3f}' for metres in truth.position)
+                rows.append(f'{self._count},{person},{format_box(truth.shown)},{clear},{place}\n')
+        self._write_line('mot.txt', ''.join(rows), end='')
+
     def close(self) -> None:
         """Close the files."""
         for file in self._files.values():
@@ -102,11 +159,11 @@ class SequenceWriter:
     ) -> None:
         self.close()
 
-    def _write_line(self, name: str, line: str) -> None:
+    def _write_line(self, name: str, line: str, end: str = '\n') -> None:
         if name not in self._files:
             self._files[name] = open_for_writing(self.folder / name)
         try:
-            self._files[name].write(line + '\n')
+            self._files[name].write(line + end)
             self._files[name].flush()
         except OSError as error:
             raise RecordingError(cannot_write(self.folder / name, error)) from None

@@ -7,12 +7,17 @@
 >>> sequence = simulate('occlusion', seed=3)
 >>> for simulated in sequence:
 ...     use(simulated.frame, simulated.visible)  # doctest: +SKIP
+
+Scenes of several people tell the truth about each of them, by id:
+
+>>> for simulated in simulate('comers', seed=3, rate_hz=10.0):
+...     use(simulated.frame, simulated.truths)  # doctest: +SKIP
 """
 
 from rgbd_kcf_tracker.simulation.build import check_request, kinect2_intrinsics, simulate
 from rgbd_kcf_tracker.simulation.picture import Truth
 from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
-from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario
+from rgbd_kcf_tracker.simulation.stage import SCENARIOS, Scenario, expand_names
 
 __all__ = [
     'SCENARIOS',
@@ -21,6 +26,7 @@ __all__ = [
     'SimulatedSequence',
     'Truth',
     'check_request',
+    'expand_names',
     'kinect2_intrinsics',
     'simulate',
 ]

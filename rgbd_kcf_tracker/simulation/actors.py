@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.room import Face, draw_face
 from rgbd_kcf_tracker.simulation.scene import View
 from rgbd_kcf_tracker.simulation.solids import Atlas, Layer, SolidList, Solids, render
+from rgbd_kcf_tracker.simulation.walking import Visit
 
 Vector = npt.NDArray[np.float64]
 Window = tuple[int, int, int, int]
@@ -49,6 +50,55 @@ class PersonActor:
     def shadow(self, t: float) -> float:
         """See `Actor`."""
         return 0.0 if self.parts == 'head' else 0.36
+
+
+@dataclass(frozen=True)
+class VisitorActor:
+    """A person who comes and goes; while away, nothing is drawn.
+
+    Attributes:
+        person: who.
+        visits: when they are there and how they move then, in order.
+        wall: distance of the wall behind which nobody casts a shadow that is seen.
+    """
+
+    person: Person
+    visits: tuple[Visit, ...]
+    wall: float = math.inf
+
+    def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
+        """See `Actor`."""
+        if not self.here(t):
+            return None
+        return PersonActor(self.person, self._motion(t)).draw(t, view, window, shade)
+
+    def centre(self, t: float) -> Vector:
+        """See `Actor`; while away, where they were last or will be first."""
+        motion = self._motion(t)
+        low = 1 - 0.3 * motion.value('sit', t)
+        pose = motion.pose(t)
+        back = 0.2 * pose.sit * self.person.height
+        return np.array([
+            pose.x - back * math.sin(pose.heading), -0.55 * low * self.person.height,
+            pose.z + back * math.cos(pose.heading),
+        ])  # fmt: skip
+
+    def shadow(self, t: float) -> float:
+        """See `Actor`."""
+        return 0.36 if self.here(t) and self.centre(t)[2] < self.wall else 0.0
+
+    def here(self, t: float) -> bool:
+        """Whether they are there."""
+        # the first visit is from before the start, the last goes on
+        first, last = self.visits[0], self.visits[-1]
+        if t < first.start:
+            return first.start <= 0
+        return any(v.start <= t <= v.end or (v is last and v.stays and t > v.end)
+                   for v in self.visits)  # fmt: skip
+
+    def _motion(self, t: float) -> Motion:
+        visits = [v for v in self.visits if v.start <= t] or [self.visits[0]]
+        return visits[-1].motion
 
 
 @dataclass(frozen=True)

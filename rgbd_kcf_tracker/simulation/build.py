@@ -15,6 +15,7 @@ from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.simulation import (  # noqa: F401  (importing them registers them)
     scenarios_basic,
     scenarios_occlusion,
+    scenarios_people,
     scenarios_special,
 )
 from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence

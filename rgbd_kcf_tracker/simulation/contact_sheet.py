@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequen
 Image = npt.NDArray[np.uint8]
 VISIBLE: tuple[int, int, int] = (60, 230, 60)
 BODY: tuple[int, int, int] = (255, 200, 60)
+OTHERS: tuple[int, int, int] = (80, 80, 240)
 _LABEL = 20
 _GAP = 8
 
@@ -32,7 +33,8 @@ def contact_sheet(
         tile: width of a tile in pixels.
 
     Returns:
-        ``(H, W, 3)`` uint8 BGR. The visible part's box is green, the whole body's blue.
+        ``(H, W, 3)`` uint8 BGR. The visible part's box is green, the whole body's blue; those of
+        other people with ids are red.
     """
     cells = [_cell(sequence, tile) for sequence in sequences]
     height = max(cell.shape[0] for cell in cells)
@@ -76,7 +78,8 @@ def draw_truth(image: Image, simulated: SimulatedFrame) -> Image:
     """A copy of the image with the true boxes; its size may differ from the frame's."""
     out: Image = image.copy()
     scale = image.shape[1] / simulated.frame.width
-    for box, color in ((simulated.body, BODY), (simulated.visible, VISIBLE)):
+    others = [(truth.visible, OTHERS) for id_, truth in simulated.truths.items() if id_ != 1]
+    for box, color in (*others, (simulated.body, BODY), (simulated.visible, VISIBLE)):
         if box is not None:
             _draw_box(out, box, scale, color)
     return out

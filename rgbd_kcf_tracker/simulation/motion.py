@@ -48,7 +48,8 @@ class Motion:
         heading: ``(seconds, radians)``; without it the figure looks where it goes.
         stride: metres per two steps.
         corner_s: smoothing of corners and of starting and stopping.
-        channels: further keys by `Pose` field (``crouch``, ``spread``, ``reach``), or ``lift``.
+        channels: further keys by `Pose` field (``crouch``, ``spread``, ``reach``, ``sit``), or
+            ``lift``.
         phase: of the gait at the start.
     """
 
@@ -96,7 +97,7 @@ class Motion:
         v = self.value
         return Pose(
             v('x', t), v('z', t), v('heading', t), v('phase', t), v('effort', t), v('crouch', t),
-            v('spread', t), v('reach', t),
+            v('spread', t), v('reach', t), v('sit', t),
         )  # fmt: skip
 
 

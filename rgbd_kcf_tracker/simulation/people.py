@@ -47,6 +47,7 @@ class Pose:
         crouch: 0 upright to 1 squatting.
         spread: 0 arms down to 1 arms out to the sides.
         reach: 0 to 1, right hand held up in front.
+        sit: 0 upright to 1 sitting: the feet stay at ``x, z``, the pelvis is behind them.
     """
 
     x: float
@@ -57,6 +58,7 @@ class Pose:
     crouch: float = 0.0
     spread: float = 0.0
     reach: float = 0.0
+    sit: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,7 @@ class Person:
         long_hair: hair down to the shoulders.
         hat: 0 none, 1 cap.
         backpack: wears one.
+        bag: ``'hand'`` or ``'shoulder'`` for one carried on the left, empty for none.
     """
 
     height: float
@@ -80,6 +83,7 @@ class Person:
     long_hair: bool = False
     hat: bool = False
     backpack: bool = False
+    bag: str = ''
 
     def solids(self, pose: Pose, parts: str = 'all') -> Solids:
         """The figure in the world frame; ``parts`` is ``'all'``, ``'head'`` or ``'body'``."""
@@ -126,18 +130,20 @@ class _Figure:
         swing = math.sin(pose.phase)
         self.legs = []
         for sign in (-1, 1):
-            thigh = -sign * amplitude * swing + 1.5 * pose.crouch
+            thigh = -sign * amplitude * swing + 1.5 * pose.crouch + 1.5 * pose.sit
             knee = 0.12 * min(pose.effort, 1) + 1.9 * amplitude * max(
                 0.0, math.cos(pose.phase) * float(-sign)
             )
-            knee += 2.55 * pose.crouch
+            knee += 2.55 * pose.crouch + 1.5 * pose.sit
             self.legs.append((thigh, thigh - knee))
         length = 0.245 * h
         reach = max(length * (math.cos(a) + math.cos(b)) for a, b in self.legs)
-        self.lean = 0.05 * pose.effort + 0.55 * pose.crouch
+        self.lean = 0.05 * pose.effort + 0.55 * pose.crouch + 0.35 * math.sin(math.pi * pose.sit)
         self.trunk = math.cos(self.lean) * self.up + math.sin(self.lean) * self.forward
         floor = np.array([pose.x, 0.0, pose.z])
         self.pelvis = floor + self.up * (reach + 0.04 * h) - self.forward * 0.2 * h * pose.crouch
+        if pose.sit > 0:
+            self.pelvis = self.pelvis - self.forward * length * math.sin(1.5 * pose.sit)
         self.chest = self.pelvis + self.trunk * 0.29 * h
         twist = 0.18 * min(pose.effort, 1.2) * swing
         self.shoulder_side = math.cos(twist) * self.side + math.sin(twist) * self.forward
@@ -175,7 +181,25 @@ class _Figure:
             for sign in (-1, 1):
                 self._arm(out, sign)
                 self._leg(out, sign)
+            if self.person.bag:
+                self._bag(out)
         return out.pack()
+
+    def _bag(self, out: SolidList) -> None:
+        h = self.unit
+        if self.person.bag == 'hand':
+            wrist = self.arm(-1)[2]
+            middle = wrist - self.up * 0.14 * h
+            out.limb(wrist - self.up * 0.03 * h, middle, 0.012 * h, 0.03 * h, EXTRA, self.forward)
+            out.ellipsoid(middle, -self.up * 0.07 * h, 0.09 * h, 0.035 * h, EXTRA, self.forward)
+            return
+        hip = self.pelvis + self.side * 0.115 * self.width - self.up * 0.01 * h
+        out.ellipsoid(hip, -self.up * 0.08 * h, 0.085 * h, 0.04 * h, EXTRA, self.forward)
+        across = self.chest - self.shoulder_side * 0.07 * self.width + self.trunk * 0.03 * h
+        for ahead in (0.075, -0.075):  # the strap, before and behind
+            middle = 0.5 * (hip + across) + self.forward * ahead * self.width
+            out.limb(across, middle, 0.009 * h, 0.009 * h, EXTRA, self.forward)
+            out.limb(middle, hip, 0.009 * h, 0.009 * h, EXTRA, self.forward)
 
     def _head(self, out: SolidList) -> None:
         h = self.unit

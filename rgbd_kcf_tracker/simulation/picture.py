@@ -24,21 +24,32 @@ HIDDEN_BELOW = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the target is at one moment.
+    """Where the target, or another person, is at one moment.
 
     Attributes:
-        visible: box of the target's visible part; None where less than a fifth of it shows.
+        shown: box of all that shows of it, however little; None where nothing does.
         body: box of the whole target, hidden parts and those beyond the image's border included;
             None where it is wholly outside the image.
         visible_fraction: visible share of the whole target's area, 0 to 1; what lies beyond the
             border counts as hidden.
-        distance: of the target's middle along the optical axis, metres.
+        position: of the target's middle in the camera's optical frame (right, down, forward),
+            metres.
     """
 
-    visible: Box | None
+    shown: Box | None
     body: Box | None
     visible_fraction: float
-    distance: float
+    position: tuple[float, float, float]
+
+    @property
+    def visible(self) -> Box | None:
+        """Box of the visible part; None where less than a fifth of the target shows."""
+        return self.shown if self.visible_fraction >= HIDDEN_BELOW else None
+
+    @property
+    def distance(self) -> float:
+        """Of the target's middle along the optical axis, metres."""
+        return self.position[2]
 
 
 class Backdrop:
@@ -106,15 +117,16 @@ class Picture:
         if shade and not self.scene.camera.fixed:
             middle = self.view.place + self.view.rotation.T @ np.array([0, 0, 3.0])
             self.color = _blurred(self.color, *self._streak(middle, middle))
-        self.body: Layer | None = None
+        self._alone: dict[int, Layer] = {}
         w, h = self.width, self.height
         layers: list[tuple[float, int, Layer]] = []
         for i, actor in enumerate(self.scene.actors):
-            window = (-w, -h, 2 * w, 2 * h) if i == 0 else (0, 0, w, h)
+            told = i in self.scene.people
+            window = (-w, -h, 2 * w, 2 * h) if told else (0, 0, w, h)
             layer = actor.draw(t, self.view, window, shade)
-            if i == 0:
-                self.body = layer
             if layer is not None:
+                if told:
+                    self._alone[i] = layer
                 middle = self.view.rotation @ (actor.centre(t) - self.view.place)
                 layers.append((float(middle[2]), i, layer))
         if shade:
@@ -204,19 +216,27 @@ class Picture:
         """Pixels in which the target is seen."""
         return np.asarray(self.owner == TARGET)
 
-    def truth(self) -> Truth:
-        """The exact boxes."""
-        centre = self.scene.actors[0].centre(self.t)
-        distance = float((self.view.rotation @ (centre - self.view.place))[2])
-        if self.body is None:
-            return Truth(None, None, 0.0, distance)
-        whole = int(np.count_nonzero(self.body.mask))
-        body = Box(self.body.x0, self.body.y0, self.body.z.shape[1], self.body.z.shape[0])
-        mask = self.target_mask
+    def truths(self) -> dict[int, Truth]:
+        """The exact boxes of everybody who has an id, the target first."""
+        return {person: self._truth(i) for person, i in enumerate(self.scene.people, 1)}
+
+    def _truth(self, index: int) -> Truth:
+        centre = self.scene.actors[index].centre(self.t)
+        x, y, z = (float(c) for c in self.view.rotation @ (centre - self.view.place))
+        alone = self._alone.get(index)
+        if alone is None:
+            return Truth(None, None, 0.0, (x, y, z))
+        whole = int(np.count_nonzero(alone.mask))
+        rows, cols = alone.z.shape
+        body = Box(alone.x0, alone.y0, cols, rows)
+        if body.clipped(self.width, self.height) is None:
+            return Truth(None, None, 0.0, (x, y, z))
+        top, left = max(alone.y0, 0), max(alone.x0, 0)
+        label = TARGET if index == 0 else index
+        mask = self.owner[top : max(alone.y0 + rows, 0), left : max(alone.x0 + cols, 0)] == label
+        shown = mask_box(mask)
         fraction = int(np.count_nonzero(mask)) / max(whole, 1)
-        visible = mask_box(mask) if fraction >= HIDDEN_BELOW else None
-        inside = body.clipped(self.width, self.height) is not None
-        return Truth(visible, body if inside else None, fraction, distance)
+        return Truth(shown and shown.moved(left, top), body, fraction, (x, y, z))
 
 
 def mask_box(mask: npt.NDArray[np.bool_]) -> Box | None:

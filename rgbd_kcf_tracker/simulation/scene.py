@@ -59,6 +59,7 @@ class Scene:
     Attributes:
         room: what stands still.
         actors: what moves, the target first.
+        people: places in ``actors`` of those whose truth is told, the target first: id 1, 2, ...
         camera: its motion.
         duration_s: natural length.
         sensor: the camera's flaws.
@@ -73,3 +74,4 @@ class Scene:
     sensor: SensorOptions = field(default_factory=SensorOptions)
     light: Callable[[float], Gain] = steady_light
     sun: Vector = field(default_factory=lambda: np.array([-0.4, -0.8, -0.45]))
+    people: tuple[int, ...] = (0,)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
-from rgbd_kcf_tracker.simulation.scene import Scene
+from rgbd_kcf_tracker.simulation.scene import Scene, Vector
 from rgbd_kcf_tracker.simulation.sensor import Sensor
 
 EPOCH_NS = 1_700_000_000_000_000_000
@@ -26,11 +26,16 @@ class SimulatedFrame:
 
     Attributes:
         frame: what the camera recorded.
-        truth: where the target is.
+        truths: where everybody with an id is, by id; the target is 1.
     """
 
     frame: Frame
-    truth: Truth
+    truths: Mapping[int, Truth]
+
+    @property
+    def truth(self) -> Truth:
+        """Where the target is."""
+        return self.truths[1]
 
     @property
     def visible(self) -> Box | None:
@@ -109,12 +114,30 @@ class SimulatedSequence:
                 later.depth, picture.color, later.target_mask if blind else None, rng
             )
         frame = Frame(color, depth, self.stamp_ns(index), self.intrinsics)
-        return SimulatedFrame(frame, picture.truth())
+        return SimulatedFrame(frame, picture.truths())
 
     def stamp_ns(self, index: int) -> int:
         """Stamp of a frame without rendering it."""
         return EPOCH_NS + self._offsets_ns[index]
 
     def truth(self, index: int) -> Truth:
-        """The truth about one frame alone, several times faster than the frame."""
-        return Picture(self._backdrop, self._offsets_ns[index] * 1e-9, shade=False).truth()
+        """The truth about the target in one frame, several times faster than the frame."""
+        return self.truths(index)[1]
+
+    def truths(self, index: int) -> dict[int, Truth]:
+        """The truth about everybody with an id in one frame, without rendering its colours."""
+        return Picture(self._backdrop, self._offsets_ns[index] * 1e-9, shade=False).truths()
+
+    def camera_pose(self, index: int) -> tuple[Vector, Vector]:
+        """The camera's rotation ``(3, 3)`` and place ``(3,)`` in metres at one frame.
+
+        A point of the optical frame is at ``rotation @ point + place`` in the room, whose axes are
+        right, down and forward, with the floor at 0 below the camera's first place.
+        """
+        rotation, place = self.scene.camera.at(self._offsets_ns[index] * 1e-9)
+        return rotation.T, place
+
+    @property
+    def people(self) -> tuple[int, ...]:
+        """The ids of those whose truth is told: 1 is the target."""
+        return tuple(range(1, len(self.scene.people) + 1))

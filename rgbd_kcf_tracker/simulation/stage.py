@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -34,24 +34,41 @@ class Scenario:
         name: what the user types.
         description: one line.
         build: makes a scene on a stage.
+        several: whether several people have ids, instead of one target.
     """
 
     name: str
     description: str
     build: Callable[[Stage], Scene]
+    several: bool = False
 
 
 SCENARIOS: dict[str, Scenario] = {}
+ALL, PEOPLE = 'all', 'people'
 
 
-def scenario(description: str) -> Callable[[Callable[[Stage], Scene]], Callable[[Stage], Scene]]:
+def scenario(
+    description: str, several: bool = False
+) -> Callable[[Callable[[Stage], Scene]], Callable[[Stage], Scene]]:
     """Register the function under its own name."""
 
     def register(build: Callable[[Stage], Scene]) -> Callable[[Stage], Scene]:
-        SCENARIOS[build.__name__] = Scenario(build.__name__, description, build)
+        SCENARIOS[build.__name__] = Scenario(build.__name__, description, build, several)
         return build
 
     return register
+
+
+def expand_names(names: Iterable[str]) -> list[str]:
+    """Names of scenarios, each once, with the groups among them spelt out.
+
+    ``'all'`` stands for every scenario of one target, ``'people'`` for those of several people.
+    """
+    groups = {
+        name: [s.name for s in SCENARIOS.values() if s.several == several]
+        for name, several in ((ALL, False), (PEOPLE, True))
+    }
+    return list(dict.fromkeys(one for name in names for one in groups.get(name, [name])))
 
 
 class Stage:

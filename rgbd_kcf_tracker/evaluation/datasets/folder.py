@@ -47,7 +47,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
             visible,
             path / 'rgb',
             path / 'depth',
-            path / _BODY,
+            _body_file(truth) if person else path / _BODY,
             path / 'timestamps.txt',
             path / 'intrinsics.json',
         )
@@ -80,9 +80,10 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
     boxes = read_boxes(truth_path)
     check_lengths(truth_path, len(boxes), images, path / 'rgb')
     body = None
-    if not person and (path / _BODY).is_file():
-        body = read_boxes(path / _BODY)
-        check_lengths(path / _BODY, len(body), images, path / 'rgb')
+    body_path = _body_file(truth_path) if person else path / _BODY
+    if body_path.is_file():
+        body = read_boxes(body_path)
+        check_lengths(body_path, len(body), images, path / 'rgb')
     fractions = None
     if visible_path.is_file():
         fractions = read_fractions(visible_path)
@@ -104,6 +105,11 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         total=len(images),
         has_body=body is not None,
     )
+
+
+def _body_file(truth_path: Path) -> Path:
+    """``body_PERSON.txt`` beside ``groundtruth_PERSON.txt``."""
+    return truth_path.with_name(truth_path.name.replace('groundtruth', 'body', 1))
 
 
 def read_fractions(path: Path) -> list[float]:

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Simulated scenes as a data set: ``sim:SCENARIO[:SEED[-SEED]]``, ``sim:all``."""
+"""Simulated scenes as a data set: ``sim:SCENARIO[:SEED[-SEED]]``, ``sim:all``, ``sim:people``."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from functools import partial
 
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence
-from rgbd_kcf_tracker.simulation import SCENARIOS, simulate
+from rgbd_kcf_tracker.simulation import SCENARIOS, expand_names, simulate
 
 PREFIX = 'sim:'
-ALL = 'all'
 
 
 def find(
@@ -40,11 +39,11 @@ def find(
         DatasetError: for an unknown scenario or a seed that is no number.
     """
     names, _, seed_text = text.removeprefix(PREFIX).partition(':')
-    chosen = list(SCENARIOS) if names == ALL else [n.strip() for n in names.split(',')]
+    chosen = expand_names(name.strip() for name in names.split(','))
     for name in (*chosen, *scenarios):
         if name not in SCENARIOS:
             raise DatasetError(
-                f'unknown scenario {name!r}: choose from all, {", ".join(SCENARIOS)}'
+                f'unknown scenario {name!r}: choose from all, people, {", ".join(SCENARIOS)}'
             )
     if scenarios:
         chosen = [name for name in chosen if name in scenarios]
