@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import math
 import re
@@ -42,7 +43,10 @@ def result(tracker: str, sequence: str, said, there, score: float = 0.8) -> Resu
     frames = compare(said, there, scores=np.full(len(said), score), skip=0)
     count = len(said)
     stamps = tuple(i * 100_000_000 for i in range(count))
-    return Result(tracker, sequence, stamps, frames, np.full(count, np.nan), np.full(count, 4.0))
+    return Result(
+        tracker, sequence, stamps, frames, np.full(count, np.nan), np.full(count, 4.0),
+        np.ones(count, np.bool_),
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -167,18 +171,16 @@ def test_the_thesis_row_of_table_4_1_is_not_self_consistent():
 
 def test_ablation_table_shows_what_is_lost(results: list[Result]):
     renamed = [
-        Result('kcf without hog' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
-               r.frames, r.fraction, r.milliseconds)
+        dataclasses.replace(r, tracker='kcf without hog') if r.tracker == 'kcf' else r
         for r in results
-    ]  # fmt: skip
+    ]
     infos = {n: Info(n, 's', 'sim', HIDDEN) for n in ('a', 'b')}
     table = tables.ablation(Measured(renamed, infos), 'rgbd')
     assert [row[0] for row in table.rows] == ['rgbd']
     other = [
-        Result('rgbd without depth' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
-               r.frames, r.fraction, r.milliseconds)
+        dataclasses.replace(r, tracker='rgbd without depth') if r.tracker == 'kcf' else r
         for r in results
-    ]  # fmt: skip
+    ]
     table = tables.ablation(Measured(other, infos), 'rgbd')
     change = {row[0]: row[2] for row in table.rows}
     assert change == {'rgbd': None, 'rgbd without depth': pytest.approx(62.5 - 75)}
@@ -227,7 +229,9 @@ def test_tables_as_csv_text_and_markdown():
 
 def truth_of(boxes: list[tuple[float, ...]], fraction: float = 1.0, hz: float = 10.0) -> Truth:
     stamps = tuple(round(i * 1e9 / hz) for i in range(len(boxes)))
-    return Truth(stamps, np.array(boxes, np.float64), None, np.full(len(boxes), fraction))
+    count = len(boxes)
+    whole = np.ones(count, np.bool_)
+    return Truth(stamps, np.array(boxes, np.float64), None, np.full(count, fraction), whole)
 
 
 def test_categories_by_our_own_criteria():

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
     from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
     from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
+    from rgbd_kcf_tracker.evaluation.report import Heading
 
 NAME = 'evaluate'
 HELP = 'run trackers on benchmarks or simulated scenes and write a report'
@@ -36,7 +37,8 @@ data sets:
 
 trackers:
   --variants          kcf, rgbd, rgbd_pf, metric, and OpenCV's opencv:kcf, opencv:csrt, opencv:mil
-  --boxes NAME=PATH   boxes in files: a folder, or a path with {sequence} in it
+  --boxes NAME=PATH   boxes in files: a folder, or a path with {sequence} in it; with --everyone
+                      MOT Challenge text
 
 examples:
   rgbd-kcf evaluate sim:all --seeds 1-3 --report report/
@@ -44,6 +46,7 @@ examples:
   rgbd-kcf evaluate data/otb --kind otb --boxes 'KCF=data/otb/{sequence}/results/KCF.txt' \\
       --report report/
   rgbd-kcf evaluate sim:all --variants metric --ablate --report report/
+  rgbd-kcf evaluate MOT17/train --everyone --boxes 'SORT=sort/' --report report/
 
 Run again with the same --report to go on after an interruption, or to add trackers.
 """
@@ -66,6 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--param', action='append', default=[], metavar='[VARIANT.]KEY=VALUE',
         help='a parameter other than its default; may be given again',
+    )  # fmt: skip
+    group.add_argument(
+        '--everyone', action='store_true',
+        help='follow everyone in view, nobody given, in recordings with the truth about several '
+        'people: HOTA, IDF1, MOTA, id switches',
     )  # fmt: skip
     group.add_argument(
         '--ablate', action='store_true',
@@ -134,9 +142,11 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.jobs import RunOptions
     from rgbd_kcf_tracker.evaluation.perframe import collect
-    from rgbd_kcf_tracker.evaluation.report import PAGE, Heading, write_report
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.tables import overview
 
+    if args.everyone:
+        _refuse(args, '--everyone', ('short_term', 'eao_lengths', 'export'))
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
@@ -154,11 +164,12 @@ def run(args: argparse.Namespace) -> int:
     _check_writable(args.report)
 
     failures = _run(sequences, contenders, args.report, options)
+    if args.everyone:
+        return _report_everyone(args, sequences, contenders, options, failures)
     collected = collect(args.report, sequences, contenders, options)
     for form in args.export:
         export(args.report, sequences, contenders, options, form)
-    words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
-    heading = Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
+    heading = _heading(args, ablated, eao_lengths)
     if not collected.results and collected.unmeasured:
         print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
     else:
@@ -167,6 +178,49 @@ def run(args: argparse.Namespace) -> int:
         print(f'\nreport: {args.report / PAGE}')
     _list_failures(failures)
     return EXIT_FAILURES if failures else 0
+
+
+def _refuse(args: argparse.Namespace, mode: str, names: Sequence[str]) -> None:
+    """Options that mean nothing in a mode, rather than leaving them out silently."""
+    for name in names:
+        if getattr(args, name):
+            option = '--' + name.replace('_', '-')
+            raise ParameterError(f'{option} is of single targets: it does not go with {mode}')
+
+
+def _report_everyone(
+    args: argparse.Namespace,
+    sequences: list[Benchmark],
+    contenders: list[Contender],
+    options: RunOptions,
+    failures: list[Failure],
+) -> int:
+    from rgbd_kcf_tracker.evaluation import everyone
+    from rgbd_kcf_tracker.evaluation.jobs import is_done
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_everyone_report
+
+    results = [
+        everyone.read(args.report, sequence, contender.name)
+        for sequence in sequences
+        for contender in contenders
+        if is_done(args.report, sequence, contender, options)
+    ]
+    table = write_everyone_report(args.report, results, contenders, failures, _heading(args))
+    print(table.text())
+    print(f'\nreport: {args.report / PAGE}')
+    _list_failures(failures)
+    return EXIT_FAILURES if failures else 0
+
+
+def _heading(
+    args: argparse.Namespace,
+    ablated: Sequence[str] = (),
+    eao_lengths: tuple[int, int] | None = None,
+) -> Heading:
+    from rgbd_kcf_tracker.evaluation.report import Heading
+
+    words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
+    return Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
 
 
 def _run(
@@ -193,17 +247,20 @@ def _run(
 
 def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
     from rgbd_kcf_tracker.evaluation import contenders
-    from rgbd_kcf_tracker.variants import VARIANTS
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
     if args.variants is not None:
         names = _words(args.variants)
     else:
-        names = [] if args.boxes and not args.ablate else list(VARIANTS)
+        ours = [DEFAULT_VARIANT] if args.everyone else list(VARIANTS)
+        names = [] if args.boxes and not args.ablate else ours
     overrides = _overrides(args.param, names)
     found, ablated = [], []
     for name in names:
         base = contenders.variant(name, overrides.get(name))
         found.append(base)
+        if args.everyone:
+            base.make_set()  # tried out, so that an error comes at once
         if args.ablate and (base.kind == 'variant' and contenders.switches(base)):
             found.extend(contenders.ablations(base))
             ablated.append(base.name)
@@ -256,6 +313,7 @@ def _data(args: argparse.Namespace) -> DatasetOptions:
         duration_s=args.duration,
         size=_size(args.size),
         names=tuple(_words(args.sequences or '')),
+        everyone=args.everyone,
     )
 
 

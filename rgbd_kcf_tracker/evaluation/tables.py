@@ -35,6 +35,8 @@ OVERVIEW: tuple[Column, ...] = (
     Column('success_auc', 'success AUC %'),
     Column('iou', 'IoU %'),
     Column('recall_of_absence', 'recall of absence %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
     Column('tp', 'TP %'),
     Column('fp', 'FP %'),
     Column('fn', 'FN %'),
@@ -50,9 +52,19 @@ BY_SCENARIO: tuple[Column, ...] = (
     Column('success', 'success %'),
     Column('iou', 'IoU %'),
     Column('recall_of_absence', 'recall of absence %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
     Column('tp', 'TP %'),
     Column('tn', 'TN %'),
     Column('precision_20px', 'P@20px %'),
+)
+
+
+PER_SEQUENCE: tuple[Column, ...] = (
+    Column('success', 'success %'),
+    Column('iou', 'IoU %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
 )
 
 
@@ -115,9 +127,9 @@ def by_scenario(measured: Measured) -> list[Table]:
 
 
 def by_sequence(measured: Measured) -> Table:
-    """Success and IoU of every tracker on every sequence."""
+    """What counts most, of every tracker on every sequence."""
     columns = ['sequence', 'scenario', 'frames']
-    columns += [f'{t}: {what}' for t in measured.trackers for what in ('success %', 'IoU %')]
+    columns += [f'{t}: {c.heading}' for t in measured.trackers for c in PER_SEQUENCE]
     rows = []
     for sequence in measured.sequences:
         cells: list[Cell] = []
@@ -125,14 +137,22 @@ def by_sequence(measured: Measured) -> Table:
         for tracker in measured.trackers:
             m, r = measured.of(tracker, sequence), measured.result(tracker, sequence)
             frames = len(r.stamps_ns) if r else frames
-            cells += [scaled(m.success, 100), scaled(m.iou, 100)] if m else [None, None]
+            cells += [scaled(getattr(m, c.name), c.scale) if m else None for c in PER_SEQUENCE]
         rows.append((sequence, measured.infos[sequence].scenario, frames, *cells))
     return Table('sequences', 'Every sequence', tuple(columns), tuple(rows))
 
 
 def ablation(measured: Measured, base: str) -> Table:
     """The variant, and what it loses without each of its ingredients."""
-    columns = ('success', 'iou', 'recall_of_absence', 'tp', 'precision_20px')
+    columns = (
+        'success',
+        'iou',
+        'recall_of_absence',
+        'strangers',
+        'returns',
+        'tp',
+        'precision_20px',
+    )
     full = measured.mean(base)
     rows = []
     for tracker in measured.trackers:
@@ -147,7 +167,8 @@ def ablation(measured: Measured, base: str) -> Table:
                 cells.append(None if tracker == base else scaled(loss, 100))
         rows.append((tracker, *cells))
     headings = (
-        'success %', 'change', 'IoU %', 'change', 'recall of absence %', 'TP %', 'P@20px %',
+        'success %', 'change', 'IoU %', 'change', 'recall of absence %', 'strangers %', 'returns %',
+        'TP %', 'P@20px %',
     )  # fmt: skip
     return Table(
         f'ablation_{base}',

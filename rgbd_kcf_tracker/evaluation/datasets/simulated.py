@@ -10,7 +10,14 @@ from collections.abc import Sequence as Items
 from functools import partial
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    BARELY_VISIBLE,
+    EVERYONE,
+    Opened,
+    Person,
+    Sample,
+    Sequence,
+)
 from rgbd_kcf_tracker.simulation import SCENARIOS, simulate
 
 PREFIX = 'sim:'
@@ -24,6 +31,7 @@ def find(
     rate_hz: float = 30.0,
     duration_s: float | None = None,
     size: tuple[int, int] = (960, 540),
+    everyone: bool = False,
 ) -> list[Sequence]:
     """The scenes that ``text`` names.
 
@@ -35,6 +43,7 @@ def find(
         rate_hz: frames per second.
         duration_s: length of each scene, None for its own.
         size: of the images, width and height in pixels.
+        everyone: in which everyone is followed, instead of the target.
 
     Raises:
         DatasetError: for an unknown scenario or a seed that is no number.
@@ -52,8 +61,10 @@ def find(
         Sequence(
             name=f'{name}/{seed}',
             scenario=name,
-            kind='sim',
-            open=partial(load, name, seed, rate_hz, duration_s, size),
+            kind=EVERYONE if everyone else 'sim',
+            open=partial(
+                load_everyone if everyone else load, name, seed, rate_hz, duration_s, size
+            ),
             identity=f'sim:{name}:{seed}:{rate_hz}:{duration_s}:{size}',
         )
         for name in chosen
@@ -89,5 +100,35 @@ def load(
     def samples() -> Iterator[Sample]:
         for moment in scene:
             yield Sample(moment.frame, moment.visible, moment.body, moment.visible_fraction)
+
+    return Opened(samples(), len(scene), has_body=True)
+
+
+def load_everyone(
+    scenario: str, seed: int, rate_hz: float, duration_s: float | None, size: tuple[int, int]
+) -> Opened:
+    """Render one scene with the truth about everyone in it.
+
+    Raises:
+        DatasetError: where the scene tells of its target alone.
+    """
+    scene = simulate(scenario, seed=seed, rate_hz=rate_hz, duration_s=duration_s, size=size)
+    if len(scene.people) < 2:  # type: ignore[attr-defined]
+        raise DatasetError(
+            f'the scenario {scenario} tells where its target is, and of nobody else: '
+            'choose one of several people'
+        )
+
+    def samples() -> Iterator[Sample]:
+        for number, moment in enumerate(scene):
+            people = tuple(
+                Person(
+                    who, truth.shown, truth.visible_fraction >= BARELY_VISIBLE, truth.body,
+                    truth.visible_fraction,
+                )
+                for who, truth in moment.truths.items()  # type: ignore[attr-defined]
+                if truth.shown is not None
+            )  # fmt: skip
+            yield Sample(moment.frame, None, people=people, number=number)
 
     return Opened(samples(), len(scene), has_body=True)
