@@ -20,7 +20,7 @@ import pytest
 from scipy.io import savemat
 
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.evaluation import strips, tables, thesis, thesis_tables
+from rgbd_kcf_tracker.evaluation import plots, strips, tables, thesis, thesis_tables
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import compare, princeton, vot
@@ -205,6 +205,27 @@ def test_scores_that_never_vary_have_no_reliability(measured: Measured):
     table, found = tables.reliability(measured)
     assert found == {}
     assert cells(table, 'kcf')['Brier'] is None
+
+
+def test_scores_on_real_and_simulated_data_apart():
+    good, bad = [TRUTH] * 4, [TRUTH, AWAY, AWAY, TRUTH]
+    runs = [
+        result('metric', 'a', good, [TRUTH] * 4, 0.95),
+        result('metric', 'a2', bad, [TRUTH] * 4, 0.5),
+        result('metric', 'b', bad, [TRUTH] * 4, 0.9),
+        result('metric', 'b2', good, [TRUTH] * 4, 0.3),
+    ]
+    kinds = {'a': 'sim', 'a2': 'sim', 'b': 'folder', 'b2': 'recording'}
+    infos = {n: Info(n, 's', kind, HIDDEN) for n, kind in kinds.items()}
+    table, found = tables.reliability(Measured(runs, infos))
+    assert list(found) == [('metric', 'real'), ('metric', 'simulated')]
+    real, simulated = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
+    sure = 'of 0.9 and more'
+    assert (real['data'], real['boxes'], real[sure]) == ('real', 6, 3)
+    assert real[f'{sure}: on the target %'] == pytest.approx(100 / 3)
+    assert simulated[f'{sure}: on the target %'] == simulated[f'{sure}: right %'] == 100
+    assert len(plots.honesty_plot(found)) > 1000
+    assert len(plots.reliability_plot(found)) > 1000
 
 
 def test_interval_of_the_mean():

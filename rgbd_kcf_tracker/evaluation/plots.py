@@ -16,9 +16,10 @@ from matplotlib.figure import Figure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
-from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability
+from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.perframe import Result
+from rgbd_kcf_tracker.evaluation.tables import REAL, SIMULATED, Scored
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 PALETTE = (
@@ -120,14 +121,15 @@ def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
     return _png(figure)
 
 
-def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
+def reliability_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
     """Share of right boxes over published score, and how many boxes have that score."""
-    count = len(tables)
+    count = len(found)
     columns = min(4, count)
     rows = -(-count // columns)
     figure = _figure(3.1 * columns + 0.4, 3.2 * rows)
-    palette = colors(list(tables))
-    for index, (tracker, table) in enumerate(tables.items()):
+    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    for index, ((tracker, data), scored) in enumerate(found.items()):
+        table = scored.reliability
         axes = figure.add_subplot(rows, columns, index + 1)
         centers = (table.edges[:-1] + table.edges[1:]) / 2
         share = table.counts / max(1, table.counts.sum())
@@ -139,10 +141,32 @@ def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
             label='right boxes',
         )  # fmt: skip
         axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel='score')
-        axes.set_title(f'{tracker}\nerror {table.expected_error:.3f}', fontsize=9)
+        axes.set_title(f'{tracker}, {data} data\nerror {table.expected_error:.3f}', fontsize=9)
         _tidy(axes)
         if index == 0:
             axes.legend(fontsize=7, frameon=False, loc='upper left')
+    return _png(figure)
+
+
+def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
+    """Of the boxes of a score and above, the share on the target; real and simulated data apart."""
+    figure = _figure(5.2, 3.6)
+    axes = figure.add_subplot()
+    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    lines = {REAL: '-', SIMULATED: '--'}
+    for (tracker, data), scored in found.items():
+        curve = scored.on_target
+        axes.plot(
+            curve.limits, curve.shares, lines[data], color=palette[tracker], lw=1.8,
+            label=f'{tracker}, {data} data',
+        )  # fmt: skip
+    axes.axvline(SURE, color='#888888', lw=0.8, ls=':')
+    axes.set(
+        xlim=(0, 1), ylim=(0, 1.02), xlabel='score and above', ylabel='boxes on the target',
+        title='What a score is worth',
+    )  # fmt: skip
+    _tidy(axes)
+    axes.legend(fontsize=8, frameon=False, loc='lower left')
     return _png(figure)
 
 

@@ -106,6 +106,7 @@ def write_report(
     }
     if reliabilities:
         content['reliability_plot'] = page.uri(plots.reliability_plot(reliabilities))
+        content['honesty_plot'] = page.uri(plots.honesty_plot(reliabilities))
     if collected.short_term:
         content['eao_plot'] = page.uri(
             plots.expected_overlap_plot(collected.short_term, heading.eao_lengths)

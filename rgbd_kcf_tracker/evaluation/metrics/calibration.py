@@ -19,6 +19,53 @@ from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 
 BINS = 10
 
+SURE = 0.9
+"""From this score on a tracker says that it is sure."""
+
+LIMITS: Array = np.linspace(0.0, 1.0, 101)
+"""Scores from which on the share of good boxes is drawn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Honesty:
+    """What boxes of a score and above are worth.
+
+    Attributes:
+        limits: ``(L,)`` scores.
+        shares: ``(L,)`` of the boxes with at least that score, the share that is good; NaN where
+            there is none.
+        sure: number of boxes scored :data:`SURE` or more.
+        sure_share: the share of them that is good, NaN without any.
+    """
+
+    limits: Array
+    shares: Array
+    sure: int
+    sure_share: float
+
+
+def honesty(scores: Array, good: Mask, limits: Array = LIMITS) -> Honesty:
+    """Of the boxes of each score and above, the share that is good.
+
+    Args:
+        scores: ``(N,)`` score of each box given; NaN left out.
+        good: ``(N,)`` whether the box is good.
+        limits: ``(L,)`` scores at which the share is wanted.
+    """
+    known = ~np.isnan(scores)
+    order = np.argsort(scores[known])
+    s, g = scores[known][order], good[known][order].astype(np.float64)
+    below = np.concatenate(([0.0], np.cumsum(g)))
+
+    def share(at: Array) -> tuple[npt.NDArray[np.int64], Array]:
+        first = np.searchsorted(s, at, side='left')
+        count = len(s) - first
+        values = (below[-1] - below[first]) / np.maximum(count, 1)
+        return count, np.where(count > 0, values, np.nan)
+
+    count, at_sure = share(np.array([SURE]))
+    return Honesty(limits, share(limits)[1], int(count[0]), float(at_sure[0]))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reliability:
