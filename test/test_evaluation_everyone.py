@@ -469,8 +469,8 @@ def test_what_fails_is_listed_and_the_rest_measured(pair: Path, tmp_path: Path, 
 @pytest.mark.parametrize(
     ('words', 'message'),
     [
-        (['--short-term'], '--short-term is of single targets'),
-        (['--export', 'vot'], '--export is of single targets'),
+        (['--short-term'], '--short-term means nothing with --everyone'),
+        (['--export', 'vot'], '--export means nothing with --everyone'),
         (['--variants', 'opencv:mil'], 'opencv:mil follows one target'),
     ],
 )

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics, progress
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -47,6 +47,7 @@ examples:
       --report report/
   rgbd-kcf evaluate sim:all --variants metric --ablate --report report/
   rgbd-kcf evaluate MOT17/train --everyone --boxes 'SORT=sort/' --report report/
+  rgbd-kcf evaluate recordings/ --identity --report report/
 
 Run again with the same --report to go on after an interruption, or to add trackers.
 """
@@ -74,6 +75,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--everyone', action='store_true',
         help='follow everyone in view, nobody given, in recordings with the truth about several '
         'people: HOTA, IDF1, MOTA, id switches',
+    )  # fmt: skip
+    group.add_argument(
+        '--identity', action='store_true',
+        help='no tracking: how well people are told apart by their look, in recordings with the '
+        'truth about several people',
     )  # fmt: skip
     group.add_argument(
         '--ablate', action='store_true',
@@ -140,11 +146,12 @@ def run(args: argparse.Namespace) -> int:
     """Run everything that is not done yet, then write the report; returns the exit code."""
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
     from rgbd_kcf_tracker.evaluation.export import export
-    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
     from rgbd_kcf_tracker.evaluation.perframe import collect
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.tables import overview
 
+    if args.identity:
+        return _identity(args)
     if args.everyone:
         _refuse(args, '--everyone', ('short_term', 'eao_lengths', 'export'))
     contenders, ablated = _contenders(args)
@@ -153,14 +160,7 @@ def run(args: argparse.Namespace) -> int:
     jobs = _default_jobs() if args.jobs is None else args.jobs
     if jobs < 1:
         raise ParameterError(f'--jobs is {jobs}: give 1 or more')
-    options = RunOptions(
-        rate_hz=args.rate,
-        use_depth=not args.no_depth,
-        short_term=args.short_term,
-        jobs=jobs,
-        fresh=args.fresh,
-        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
-    )
+    options = _run_options(args, jobs)
     _check_writable(args.report)
 
     failures = _run(sequences, contenders, args.report, options)
@@ -185,7 +185,47 @@ def _refuse(args: argparse.Namespace, mode: str, names: Sequence[str]) -> None:
     for name in names:
         if getattr(args, name):
             option = '--' + name.replace('_', '-')
-            raise ParameterError(f'{option} is of single targets: it does not go with {mode}')
+            raise ParameterError(f'{option} means nothing with {mode}: leave one of them out')
+
+
+def _identity(args: argparse.Namespace) -> int:
+    from rgbd_kcf_tracker.evaluation import identity
+    from rgbd_kcf_tracker.evaluation.datasets import open_dataset
+    from rgbd_kcf_tracker.evaluation.jobs import Failure, as_asked
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_identity_report
+
+    options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'jobs', 'fresh')
+    _refuse(args, '--identity', (*options, 'short_term', 'eao_lengths', 'export'))
+    sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
+    _check_writable(args.report)
+    views = identity.metric_views()
+    seen, failures = [], []
+    for sequence in sequences:
+        try:
+            samples = as_asked(sequence.open().samples, sequence, _run_options(args, 1))
+            frames = progress(samples, None, sequence.name)
+            seen.append(identity.look(sequence.name, frames, views))
+        except RgbdKcfError as error:
+            failures.append(Failure(sequence.name, '', str(error)))
+    pairs = identity.all_pairs(seen, views)
+    table = write_identity_report(args.report, pairs, failures, _heading(args))
+    print(table.text())
+    print(f'\nreport: {args.report / PAGE}')
+    _list_failures(failures)
+    return EXIT_FAILURES if failures else 0
+
+
+def _run_options(args: argparse.Namespace, jobs: int) -> RunOptions:
+    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+
+    return RunOptions(
+        rate_hz=args.rate,
+        use_depth=not args.no_depth,
+        short_term=args.short_term,
+        jobs=jobs,
+        fresh=args.fresh,
+        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+    )
 
 
 def _report_everyone(
@@ -313,7 +353,7 @@ def _data(args: argparse.Namespace) -> DatasetOptions:
         duration_s=args.duration,
         size=_size(args.size),
         names=tuple(_words(args.sequences or '')),
-        everyone=args.everyone,
+        everyone=args.everyone or args.identity,
     )
 
 

@@ -210,7 +210,7 @@ def _run_sequence(job: Job) -> list[Failure]:
 
 def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
     sequence, options = job.sequence, job.options
-    samples = _as_asked(opened.samples, sequence, options)
+    samples = as_asked(opened.samples, sequence, options)
     keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
     failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
     return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]
@@ -266,12 +266,13 @@ def _meta(
 
 
 def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterator[Sample]:
-    yield from _as_asked(from_first_view(opened.samples), sequence, options)
+    yield from as_asked(from_first_view(opened.samples), sequence, options)
 
 
-def _as_asked(
+def as_asked(
     samples: Iterable[Sample], sequence: Sequence, options: RunOptions
 ) -> Iterator[Sample]:
+    """The samples at the rate, with the camera, and with the depth or not, that were asked for."""
     # Scenes are rendered at their rate, by their own camera.
     recorded = sequence.kind != 'sim' and (sequence.kind != EVERYONE or sequence.path is not None)
     if options.rate_hz is not None and recorded:

@@ -12,10 +12,18 @@ from typing import Any
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation import everyone_tables, page, plots, tables, thesis_tables
+from rgbd_kcf_tracker.evaluation import (
+    everyone_tables,
+    identity_tables,
+    page,
+    plots,
+    tables,
+    thesis_tables,
+)
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import EVERYONE
 from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
+from rgbd_kcf_tracker.evaluation.identity import Pairs
 from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
@@ -145,6 +153,36 @@ def write_everyone_report(
     content = {'everyone': every} | _head(
         heading, failures, palette, {r.sequence: r.frames for r in results}
     )
+    write_atomically(folder / PAGE, page.render(content))
+    return every[0]
+
+
+def write_identity_report(
+    folder: Path, pairs: Sequence[Pairs], failures: Sequence[Failure], heading: Heading
+) -> Table:
+    """Write the report of how well people are told apart.
+
+    Returns:
+        The overview, for printing.
+
+    Raises:
+        DatasetError: where nothing could be measured.
+    """
+    _write_failures(folder / 'failures.txt', failures)
+    if not any(len(p.probability) for p in pairs):
+        raise DatasetError(
+            _why_nothing(failures) if failures else 'no two sightings could be compared'
+        )
+    calibration, reliabilities = identity_tables.calibration(pairs)
+    every = [identity_tables.overview(pairs), calibration]
+    _write_tables(folder, every)
+    write_atomically(folder / 'pairs.csv', identity_tables.pairs_csv(pairs))
+    frames = {s.recording: s.frames for p in pairs for s in p.seen}
+    write_json(folder / 'report.json', _numbers(every, (), failures, heading), indent=1)
+    content = {
+        'identity': every,
+        'identity_plot': page.uri(plots.pairs_plot(reliabilities)),
+    } | _head(heading, failures, {}, frames)
     write_atomically(folder / PAGE, page.render(content))
     return every[0]
 

@@ -88,23 +88,28 @@ class Reliability:
     brier: float
 
 
-def reliability(scores: Array, hits: Mask, bins: int = BINS) -> Reliability:
+def reliability(
+    scores: Array, hits: Mask, bins: int = BINS, weights: Array | None = None
+) -> Reliability:
     """Reliability of the boxes' scores.
 
     Args:
         scores: ``(N,)`` score of each box given; values outside 0 to 1 are clipped, NaN left out.
         hits: ``(N,)`` whether the box is right.
         bins: number of equal bins.
+        weights: ``(N,)`` how much each counts in all but ``counts``; alike by default.
     """
     known = ~np.isnan(scores)
     s, h = np.clip(scores[known], 0.0, 1.0), hits[known].astype(np.float64)
+    w = np.ones(len(s)) if weights is None else weights[known]
     edges = np.linspace(0.0, 1.0, bins + 1)
     index = np.clip(np.ceil(s * bins).astype(np.int64) - 1, 0, bins - 1)
     counts = np.bincount(index, minlength=bins)
-    some = np.maximum(counts, 1)
     empty = counts == 0
-    mean_score = np.where(empty, np.nan, np.bincount(index, s, bins) / some)
-    hit_rate = np.where(empty, np.nan, np.bincount(index, h, bins) / some)
+    weight = np.bincount(index, w, bins)
+    some = np.where(empty, 1.0, weight)
+    mean_score = np.where(empty, np.nan, np.bincount(index, w * s, bins) / some)
+    hit_rate = np.where(empty, np.nan, np.bincount(index, w * h, bins) / some)
     if not len(s):
         return Reliability(edges, counts, mean_score, hit_rate, math.nan, math.nan)
     gap = np.nan_to_num(np.abs(mean_score - hit_rate))
@@ -113,6 +118,6 @@ def reliability(scores: Array, hits: Mask, bins: int = BINS) -> Reliability:
         counts,
         mean_score,
         hit_rate,
-        expected_error=float(np.sum(gap * counts) / counts.sum()),
-        brier=float(np.mean((s - h) ** 2)),
+        expected_error=float(np.sum(gap * weight) / weight.sum()),
+        brier=float(np.average((s - h) ** 2, weights=w)),
     )
