@@ -318,6 +318,39 @@ def test_a_file_for_each_person(tmp_path: Path):
         opened(path)
 
 
+def test_whole_bodies_lie_beside_either(pair: Path, tmp_path: Path):
+    bodies = [Box(30 + n, 0, 12, 40) for n in range(8)]
+    write(pair / 'body_7.txt', ''.join(f'{b.x},{b.y},{b.width},{b.height}\n' for b in bodies))
+    sequence, samples = opened(pair)
+    assert sequence.open().has_body
+    assert [p.body for p in samples[1].people] == [None, bodies[1]]
+    told = {1: samples[0].people[0].box, 7: bodies[0]}
+    followed = follow(Fixed(told), samples[:1])
+    assert followed.score().mota == 1, 'the whole body is as good'
+    hall = tmp_path / 'hall'
+    images(hall / 'rgb', 2)
+    write(hall / 'groundtruth_3.txt', '1,2,3,4\n2,2,3,4\n')
+    write(hall / 'groundtruth_12.txt', '1,9,3,4\n2,9,3,4\n')
+    write(hall / 'body_12.txt', '1,9,3,8\nnan,nan,nan,nan\n')
+    _, samples = opened(hall)
+    assert {p.id: p.body for p in samples[0].people} == {3: None, 12: Box(1, 9, 3, 8)}
+    write(hall / 'body_12.txt', '1,9,3,8\n')
+    with pytest.raises(DatasetError, match=r'body_12\.txt, line 1'):
+        opened(hall)
+
+
+class Fixed:
+    """Always says the same boxes."""
+
+    everyone = False
+
+    def __init__(self, boxes: dict[int, Box]) -> None:
+        self.boxes = boxes
+
+    def update(self, frame):
+        return {who: Track(box, TrackState.TRACKING, 1.0) for who, box in self.boxes.items()}
+
+
 def test_the_challenges_own_folders(tmp_path: Path):
     path = tmp_path / 'train' / 'MOT17-02'
     images(path / 'img1', 3)

@@ -70,6 +70,18 @@ def test_people_who_barely_show_and_regions_are_not_looked_at():
     assert [(v.person, v.frame, v.what) for v in seen.views] == [(1, 0, 9)]
 
 
+def test_each_frame_is_shown_first_also_those_without_people():
+    told = []
+    views = Views(lambda frame, box: len(told), BY_COLOR.compare, lambda f: told.append(f.stamp_ns))
+    empty, full = (
+        Sample(picture(9, 0), None),
+        Sample(picture(9, 1), None, people=(Person(1, Box(1, 1, 5, 5)),)),
+    )
+    found = look('a', [empty, full], views)
+    assert told == [0, 1_000_000_000]
+    assert [v.what for v in found.views] == [2]
+
+
 def seen(name: str, *views: tuple[int, float, int]) -> Seen:
     """Views of ``(person, seconds, look)``."""
     made = tuple(View(who, i, round(s * 1e9), what) for i, (who, s, what) in enumerate(views))

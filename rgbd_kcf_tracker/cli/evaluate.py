@@ -198,16 +198,15 @@ def _identity(args: argparse.Namespace) -> int:
     _refuse(args, '--identity', (*options, 'short_term', 'eao_lengths', 'export'))
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
     _check_writable(args.report)
-    views = identity.metric_views()
     seen, failures = [], []
     for sequence in sequences:
         try:
             samples = as_asked(sequence.open().samples, sequence, _run_options(args, 1))
             frames = progress(samples, None, sequence.name)
-            seen.append(identity.look(sequence.name, frames, views))
+            seen.append(identity.look(sequence.name, frames, identity.metric_views()))
         except RgbdKcfError as error:
             failures.append(Failure(sequence.name, '', str(error)))
-    pairs = identity.all_pairs(seen, views)
+    pairs = identity.all_pairs(seen, identity.metric_views())
     table = write_identity_report(args.report, pairs, failures, _heading(args))
     print(table.text())
     print(f'\nreport: {args.report / PAGE}')

@@ -42,10 +42,13 @@ class Views:
     Attributes:
         describe: of a frame and a box in it; None where nothing can be said of the sighting.
         compare: probability that two descriptions are of one person, 0 to 1.
+        watch: is told of each frame before its people are described, in time order: what describes
+            may learn the room from it. Take new views for each recording where it does.
     """
 
     describe: Callable[[Frame, Box], object | None]
     compare: Callable[[Any, Any], float]
+    watch: Callable[[Frame], None] = lambda frame: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,7 +110,7 @@ class Pairs:
 
 
 def metric_views() -> Views:
-    """How the ``metric`` tracker describes and compares people."""
+    """How the ``metric`` tracker describes and compares people; new ones for a recording."""
     from rgbd_kcf_tracker.metric.identity.gallery import (  # type: ignore[import-not-found]
         compare_views,
         describe_view,
@@ -128,6 +131,7 @@ def look(recording: str, samples: Iterable[Sample], views: Views) -> Seen:
     count = frames = 0
     for number, sample in enumerate(samples):
         frames += 1
+        views.watch(sample.frame)
         for person in sample.people:
             if not person.counts:
                 continue

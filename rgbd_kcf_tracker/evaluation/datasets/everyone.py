@@ -4,7 +4,8 @@
 """Recordings with the truth about everyone in view: ids, boxes, and how much of each shows.
 
 The truth lies beside the images as MOT Challenge text (``mot.txt``, or ``gt/gt.txt`` as the
-challenge has it), or as one ``groundtruth_PERSON.txt`` for each, with ``visible_PERSON.txt``.
+challenge has it), or as one ``groundtruth_PERSON.txt`` for each, with ``visible_PERSON.txt``. With
+either, ``body_PERSON.txt`` has the whole body, where it is known (simulated scenes).
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from rgbd_kcf_tracker.evaluation.datasets.folder import (
     read_frames,
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, image_files
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.mot import read_mot
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 
@@ -52,7 +54,8 @@ def is_sequence(path: Path) -> bool:
 
 def find(path: Path, fps: float) -> list[Sequence]:
     """The one recording of a folder."""
-    files = [*_truth_files(path), *(_share_file(p) for p in people_files(path))]
+    files = [*_truth_files(path), *sorted(path.glob('visible_*.txt'))]
+    files += sorted(path.glob('body_*.txt'))
     parts = [path / n for n in (*IMAGE_FOLDERS, 'depth', 'timestamps.txt', 'intrinsics.json')]
     return [
         Sequence(
@@ -79,7 +82,10 @@ def load(path: Path, fps: float) -> Opened:
     images = image_files(folder)
     truth = _truth_files(path)
     together = truth[0].name in (MOT_FILE, _CHALLENGE.name)
-    people = _from_mot(truth[0], len(images)) if together else _from_files(truth, images, folder)
+    if together:
+        people = _from_mot(truth[0], path, images, folder)
+    else:
+        people = _from_files(truth, images, folder)
     if not people:
         raise DatasetError(f'{truth[0]}: nobody is ever in view: nothing to measure against')
     frames = read_frames(path, images, _challenge_rate(path) or fps)
@@ -90,24 +96,34 @@ def load(path: Path, fps: float) -> Opened:
             present = tuple(people.get(number, ()))
             yield dataclasses.replace(sample, people=present, number=number)
 
-    return Opened(samples(), len(images), total=len(images))
+    known = any(p.body is not None for present in people.values() for p in present)
+    return Opened(samples(), len(images), total=len(images), has_body=known)
 
 
-def _from_mot(path: Path, length: int) -> People:
-    rows = read_mot(path, length, regions=True)
+def _from_mot(path: Path, beside: Path, images: tuple[Path, ...], folder: Path) -> People:
+    rows = read_mot(path, len(images), regions=True)
+    bodies = {
+        int(who): _bodies(beside / f'body_{who}.txt', images, folder) for who in set(rows.ids)
+    }
     people: People = defaultdict(list)
     for row, (frame, who, score, share) in enumerate(
         zip(rows.frames, rows.ids, rows.scores, rows.shares, strict=True)
     ):
         shown = None if share != share else float(share)
-        people[int(frame)].append(Person(int(who), rows.box(row), bool(score > 0), share=shown))
+        body = bodies[int(who)][frame]
+        person = Person(int(who), rows.box(row), bool(score > 0), body, shown)
+        people[int(frame)].append(person)
     return people
 
 
 def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> People:
-    """A file for each person; ids from 1 in the order of their names."""
+    """A file for each person; ids are their names if all are numbers, else counted from 1."""
     people: People = defaultdict(list)
-    for who, path in enumerate(paths, start=1):
+    names = [path.stem.removeprefix('groundtruth_') for path in paths]
+    numbers = all(name.isascii() and name.isdigit() for name in names)
+    for count, (name, path) in enumerate(zip(names, paths, strict=True), start=1):
+        who = int(name) if numbers else count
+        bodies = _bodies(path.with_name(f'body_{name}.txt'), images, folder)
         boxes = read_boxes(path)
         check_lengths(path, len(boxes), images, folder)
         shares: list[float] | None = None
@@ -118,8 +134,17 @@ def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> Pe
             if box is not None:
                 share = None if shares is None else shares[frame]
                 counts = share is None or share >= BARELY_VISIBLE
-                people[frame].append(Person(who, box, counts, share=share))
+                people[frame].append(Person(who, box, counts, bodies[frame], share))
     return people
+
+
+def _bodies(path: Path, images: tuple[Path, ...], folder: Path) -> list[Box | None]:
+    """The whole body in each frame; None where it is not known."""
+    if not path.is_file():
+        return [None] * len(images)
+    boxes = read_boxes(path)
+    check_lengths(path, len(boxes), images, folder)
+    return boxes
 
 
 def _image_folder(path: Path) -> Path | None:
