@@ -100,6 +100,7 @@ def test_everyone_and_some_who_are_given(folder: Path, tmp_path: Path, fake):
     rows = read_mot(text)
     assert rows.ids.tolist() == [10] * 4
     assert rows.frames.tolist() == [0, 1, 2, 3]
+    assert fake.made[0].updates == 4, 'others may be in the first frame too'
 
 
 def test_one_target_as_mot_text(folder: Path, tmp_path: Path):

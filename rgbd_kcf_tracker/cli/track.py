@@ -245,11 +245,13 @@ class _Several:
         """The tracks in ``frame`` by id; boxes where targets are given."""
         from rgbd_kcf_tracker.track import Track, TrackState
 
-        if boxes:
-            return {
-                self._targets.add(frame, box): Track(box, TrackState.TRACKING, 1.0) for box in boxes
-            }
-        return dict(self._targets.update(frame))
+        tracks: dict[int, Track] = {}
+        if self._targets.everyone or not boxes:
+            tracks.update(self._targets.update(frame))
+        for box in boxes:
+            who = self._targets.add(frame, box)
+            tracks[who] = Track(box, TrackState.TRACKING, 1.0)
+        return tracks
 
 
 def _several(args: argparse.Namespace) -> bool:

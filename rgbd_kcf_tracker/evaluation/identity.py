@@ -32,6 +32,9 @@ MOST_VIEWS = 40
 """Sightings of one person in one recording that are compared, spread evenly: pairs go with the
 square of their number, and neighbours in time say little new."""
 
+SAME_FIGURE_IOU = 0.5
+"""A figure that the tracker found is the one of the ground truth from this overlap on."""
+
 _CAMERA = re.compile(r'(.+)_cam\w+')
 
 
@@ -48,7 +51,7 @@ class Views:
 
     describe: Callable[[Frame, Box], object | None]
     compare: Callable[[Any, Any], float]
-    watch: Callable[[Frame], None] = lambda frame: None
+    watch: Callable[[Frame], object] = lambda frame: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,12 +114,30 @@ class Pairs:
 
 def metric_views() -> Views:
     """How the ``metric`` tracker describes and compares people; new ones for a recording."""
+    from rgbd_kcf_tracker.metric.decide.visible_box import (  # type: ignore[attr-defined]
+        outline_box,
+    )
     from rgbd_kcf_tracker.metric.identity.gallery import (  # type: ignore[import-not-found]
-        compare_views,
-        describe_view,
+        same_person,
+    )
+    from rgbd_kcf_tracker.metric.parameters import MetricParameters
+    from rgbd_kcf_tracker.metric.targets import (  # type: ignore[import-not-found]
+        MetricTargets,
     )
 
-    return Views(describe_view, compare_views)
+    targets = MetricTargets(MetricParameters())
+    targets.everyone = True
+
+    def describe(frame: Frame, box: Box) -> object | None:
+        """The look of the figure that is in the box, if one is."""
+        account = targets.account
+        if account is None:
+            return None
+        near = [outline_box(account.scene, s.figure.seen).iou(box) for s in account.sights]
+        best = max(range(len(near)), key=near.__getitem__, default=-1)
+        return account.sights[best].view if best >= 0 and near[best] >= SAME_FIGURE_IOU else None
+
+    return Views(describe, same_person, targets.update)
 
 
 def look(recording: str, samples: Iterable[Sample], views: Views) -> Seen:
