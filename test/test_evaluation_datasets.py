@@ -474,7 +474,9 @@ def test_real_people_walking_past_each_other(shared_data: Path):
 
 def test_real_folders(shared_data: Path):
     found = open_dataset(str(shared_data / 'rgbd'))
-    assert len(found) == 9
+    people = {'filinha': 6, 'group_cam1': 6, 'group_cam2': 7, 'imgseq1': 1}
+    assert {name: sum(s.name.startswith(f'{name}/') for s in found) for name in people} == people
+    assert {s.name for s in found if '/' not in s.name} == {'person_turn', 'redkitchen'}
     otb = open_dataset(str(shared_data / 'otb'), DatasetOptions(kind='otb'))
     lengths = {s.name: s.open().length for s in otb}
     assert lengths == {'Basketball': 725, 'Couple': 140, 'Crossing': 120, 'Football1': 74}

@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.evaluation.metrics import (
     measure_boxes,
     otb,
     pooled_counts,
+    presence,
     princeton,
 )
 from rgbd_kcf_tracker.evaluation.metrics.boxes import (
@@ -312,3 +313,46 @@ def test_pooled_counts_add_up():
     parts = [compare(SAID, THERE, skip=0), compare([TRUTH], [TRUTH], skip=0)]
     assert pooled_counts(parts) == confusion.Counts(tp=5, fp=2, tn=3, fn=1)
     assert measure(parts[1]).tp == 1
+
+
+def present_as(pattern: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Overlap, box given, target there of a run of letters.
+
+    H a hit, m a box that overlaps by 0.3, s one that overlaps by 0.05, n no box; capitals X and O
+    are of an absent target: a box, no box.
+    """
+    overlap = np.array([{'H': 0.8, 'm': 0.3, 's': 0.05}.get(c, np.nan) for c in pattern])
+    said = np.array([c in 'HmsX' for c in pattern])
+    there = np.array([c in 'Hmsn' for c in pattern])
+    return overlap, said, there
+
+
+def test_strangers_are_boxes_on_something_else_of_all_frames():
+    assert presence.strangers(*present_as('HmsnXO')) == pytest.approx(2 / 6)
+    assert presence.strangers(*present_as('HHHn')) == 0
+    assert math.isnan(presence.strangers(*present_as('')))
+
+
+@pytest.mark.parametrize(
+    ('pattern', 'value'),
+    [
+        ('HHHHHHHH', math.nan),  # never away
+        ('HHOOnnHHn', 1),  # two frames to recognise; of the other three, two are hit
+        ('HHOOHHHnn', 0),  # hit at first, then lost: one of three
+        ('HHOOHHHH', math.nan),  # back for four frames only
+        ('HHOHHHHH', 1),  # away for one frame
+        ('HOnnHHHOnnnnnO', 0.5),  # back twice, found once
+        ('OOHHHHH', 1),  # given, and away from the first frame that counts
+        ('HXXmmmmm', 0),  # there, but not hit
+        ('', math.nan),
+    ],
+)
+def test_returns_are_found_from_the_third_frame_on(pattern: str, value: float):
+    assert presence.returns(*present_as(pattern)) == pytest.approx(value, nan_ok=True)
+
+
+def test_strangers_and_returns_are_among_the_measures():
+    truth = [TRUTH, None, *[TRUTH] * 5]
+    m = measure_boxes([TRUTH, AWAY, *[TRUTH] * 5], truth)
+    assert (m.strangers, m.returns) == (pytest.approx(1 / 6), 1)
+    assert measure_boxes([TRUTH, None, *[AWAY] * 5], truth).strangers == pytest.approx(5 / 6)

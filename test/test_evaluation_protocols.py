@@ -142,3 +142,19 @@ def test_perfectly_calibrated_scores_have_no_error():
     scores = rng.uniform(size=20000)
     hits = rng.uniform(size=20000) < scores
     assert calibration.reliability(scores, hits).expected_error < 0.02
+
+
+def test_honesty_by_hand():
+    scores = np.array([0.2, 0.5, 0.9, 0.95, 1.0, np.nan])
+    good = np.array([False, True, True, False, True, True])
+    found = calibration.honesty(scores, good, np.array([0.0, 0.5, 0.9, 0.96, 1.1]))
+    assert found.shares[:4] == pytest.approx([3 / 5, 3 / 4, 2 / 3, 1])
+    assert math.isnan(found.shares[4])
+    assert (found.sure, found.sure_share) == (3, pytest.approx(2 / 3))
+
+
+def test_honesty_of_a_tracker_that_is_never_sure():
+    found = calibration.honesty(np.array([0.1]), np.array([True]))
+    assert found.sure == 0
+    assert math.isnan(found.sure_share)
+    assert math.isnan(calibration.honesty(np.zeros(0), np.zeros(0, bool)).sure_share)

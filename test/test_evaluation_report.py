@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import math
 import re
@@ -19,7 +20,7 @@ import pytest
 from scipy.io import savemat
 
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.evaluation import strips, tables, thesis, thesis_tables
+from rgbd_kcf_tracker.evaluation import plots, strips, tables, thesis, thesis_tables
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import compare, princeton, vot
@@ -42,7 +43,10 @@ def result(tracker: str, sequence: str, said, there, score: float = 0.8) -> Resu
     frames = compare(said, there, scores=np.full(len(said), score), skip=0)
     count = len(said)
     stamps = tuple(i * 100_000_000 for i in range(count))
-    return Result(tracker, sequence, stamps, frames, np.full(count, np.nan), np.full(count, 4.0))
+    return Result(
+        tracker, sequence, stamps, frames, np.full(count, np.nan), np.full(count, 4.0),
+        np.ones(count, np.bool_),
+    )  # fmt: skip
 
 
 @pytest.fixture
@@ -167,18 +171,16 @@ def test_the_thesis_row_of_table_4_1_is_not_self_consistent():
 
 def test_ablation_table_shows_what_is_lost(results: list[Result]):
     renamed = [
-        Result('kcf without hog' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
-               r.frames, r.fraction, r.milliseconds)
+        dataclasses.replace(r, tracker='kcf without hog') if r.tracker == 'kcf' else r
         for r in results
-    ]  # fmt: skip
+    ]
     infos = {n: Info(n, 's', 'sim', HIDDEN) for n in ('a', 'b')}
     table = tables.ablation(Measured(renamed, infos), 'rgbd')
     assert [row[0] for row in table.rows] == ['rgbd']
     other = [
-        Result('rgbd without depth' if r.tracker == 'kcf' else r.tracker, r.sequence, r.stamps_ns,
-               r.frames, r.fraction, r.milliseconds)
+        dataclasses.replace(r, tracker='rgbd without depth') if r.tracker == 'kcf' else r
         for r in results
-    ]  # fmt: skip
+    ]
     table = tables.ablation(Measured(other, infos), 'rgbd')
     change = {row[0]: row[2] for row in table.rows}
     assert change == {'rgbd': None, 'rgbd without depth': pytest.approx(62.5 - 75)}
@@ -205,6 +207,27 @@ def test_scores_that_never_vary_have_no_reliability(measured: Measured):
     assert cells(table, 'kcf')['Brier'] is None
 
 
+def test_scores_on_real_and_simulated_data_apart():
+    good, bad = [TRUTH] * 4, [TRUTH, AWAY, AWAY, TRUTH]
+    runs = [
+        result('metric', 'a', good, [TRUTH] * 4, 0.95),
+        result('metric', 'a2', bad, [TRUTH] * 4, 0.5),
+        result('metric', 'b', bad, [TRUTH] * 4, 0.9),
+        result('metric', 'b2', good, [TRUTH] * 4, 0.3),
+    ]
+    kinds = {'a': 'sim', 'a2': 'sim', 'b': 'folder', 'b2': 'recording'}
+    infos = {n: Info(n, 's', kind, HIDDEN) for n, kind in kinds.items()}
+    table, found = tables.reliability(Measured(runs, infos))
+    assert list(found) == [('metric', 'real'), ('metric', 'simulated')]
+    real, simulated = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
+    sure = 'of 0.9 and more'
+    assert (real['data'], real['boxes'], real[sure]) == ('real', 6, 3)
+    assert real[f'{sure}: on the target %'] == pytest.approx(100 / 3)
+    assert simulated[f'{sure}: on the target %'] == simulated[f'{sure}: right %'] == 100
+    assert len(plots.honesty_plot(found)) > 1000
+    assert len(plots.reliability_plot(found)) > 1000
+
+
 def test_interval_of_the_mean():
     low, high = tables.bootstrap_interval(np.array([0.4, 0.5, 0.6, 0.5] * 20))
     assert 0.47 < low < 0.5 < high < 0.53
@@ -227,7 +250,9 @@ def test_tables_as_csv_text_and_markdown():
 
 def truth_of(boxes: list[tuple[float, ...]], fraction: float = 1.0, hz: float = 10.0) -> Truth:
     stamps = tuple(round(i * 1e9 / hz) for i in range(len(boxes)))
-    return Truth(stamps, np.array(boxes, np.float64), None, np.full(len(boxes), fraction))
+    count = len(boxes)
+    whole = np.ones(count, np.bool_)
+    return Truth(stamps, np.array(boxes, np.float64), None, np.full(count, fraction), whole)
 
 
 def test_categories_by_our_own_criteria():

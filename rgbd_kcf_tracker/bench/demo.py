@@ -260,6 +260,7 @@ def _print_table(options: argparse.Namespace, truth: Truth, lockstep: Run, live:
                 'success, IoU > 0.5': f'{100 * measures.success:.1f} %',
                 'mean IoU when visible': f'{100 * measures.iou:.1f} %',
                 'recall of absence': f'{100 * measures.recall_of_absence:.1f} %',
+                'strangers': f'{100 * measures.strangers:.1f} %',
                 'frame rate': f'{run.figures["rate_hz"]:.1f} Hz',
                 'latency, median': f'{latency["median"]:.1f} ms',
                 'latency, p99': f'{latency["p99"]:.1f} ms',

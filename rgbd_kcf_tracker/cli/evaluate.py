@@ -13,14 +13,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics, progress
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
     from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
     from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
     from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
+    from rgbd_kcf_tracker.evaluation.report import Heading
 
 NAME = 'evaluate'
 HELP = 'run trackers on benchmarks or simulated scenes and write a report'
@@ -37,7 +38,8 @@ data sets:
 
 trackers:
   --variants          kcf, rgbd, rgbd_pf, metric, and OpenCV's opencv:kcf, opencv:csrt, opencv:mil
-  --boxes NAME=PATH   boxes in files: a folder, or a path with {sequence} in it
+  --boxes NAME=PATH   boxes in files: a folder, or a path with {sequence} in it; with --everyone
+                      MOT Challenge text
 
 examples:
   rgbd-kcf evaluate sim:all --seeds 1-3 --report report/
@@ -45,6 +47,8 @@ examples:
   rgbd-kcf evaluate data/otb --kind otb --boxes 'KCF=data/otb/{sequence}/results/KCF.txt' \\
       --report report/
   rgbd-kcf evaluate sim:all --variants metric --ablate --report report/
+  rgbd-kcf evaluate MOT17/train --everyone --boxes 'SORT=sort/' --report report/
+  rgbd-kcf evaluate recordings/ --identity --report report/
 
 Run again with the same --report to go on after an interruption, or to add trackers.
 """
@@ -67,6 +71,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--param', action='append', default=[], metavar='[VARIANT.]KEY=VALUE',
         help='a parameter other than its default; may be given again',
+    )  # fmt: skip
+    group.add_argument(
+        '--everyone', action='store_true',
+        help='follow everyone in view, nobody given, in recordings with the truth about several '
+        'people: HOTA, IDF1, MOTA, id switches',
+    )  # fmt: skip
+    group.add_argument(
+        '--identity', action='store_true',
+        help='no tracking: how well people are told apart by their look, in recordings with the '
+        'truth about several people',
     )  # fmt: skip
     group.add_argument(
         '--ablate', action='store_true',
@@ -133,33 +147,30 @@ def run(args: argparse.Namespace) -> int:
     """Run everything that is not done yet, then write the report; returns the exit code."""
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
     from rgbd_kcf_tracker.evaluation.export import export
-    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
     from rgbd_kcf_tracker.evaluation.perframe import collect
-    from rgbd_kcf_tracker.evaluation.report import PAGE, Heading, write_report
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.tables import overview
 
+    if args.identity:
+        return _identity(args)
+    if args.everyone:
+        _refuse(args, '--everyone', ('short_term', 'eao_lengths', 'export'))
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
     jobs = _default_jobs() if args.jobs is None else args.jobs
     if jobs < 1:
         raise ParameterError(f'--jobs is {jobs}: give 1 or more')
-    options = RunOptions(
-        rate_hz=args.rate,
-        use_depth=not args.no_depth,
-        short_term=args.short_term,
-        jobs=jobs,
-        fresh=args.fresh,
-        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
-    )
+    options = _run_options(args, jobs)
     _check_writable(args.report)
 
     failures = _run(sequences, contenders, args.report, options)
+    if args.everyone:
+        return _report_everyone(args, sequences, contenders, options, failures)
     collected = collect(args.report, sequences, contenders, options)
     for form in args.export:
         export(args.report, sequences, contenders, options, form)
-    words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
-    heading = Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
+    heading = _heading(args, ablated, eao_lengths)
     if not collected.results and collected.unmeasured:
         print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
     else:
@@ -168,6 +179,88 @@ def run(args: argparse.Namespace) -> int:
         print(f'\nreport: {args.report / PAGE}')
     _list_failures(failures)
     return EXIT_FAILURES if failures else 0
+
+
+def _refuse(args: argparse.Namespace, mode: str, names: Sequence[str]) -> None:
+    """Options that mean nothing in a mode, rather than leaving them out silently."""
+    for name in names:
+        if getattr(args, name):
+            option = '--' + name.replace('_', '-')
+            raise ParameterError(f'{option} means nothing with {mode}: leave one of them out')
+
+
+def _identity(args: argparse.Namespace) -> int:
+    from rgbd_kcf_tracker.evaluation import identity
+    from rgbd_kcf_tracker.evaluation.datasets import open_dataset
+    from rgbd_kcf_tracker.evaluation.jobs import Failure, as_asked
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_identity_report
+
+    options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'jobs', 'fresh')
+    _refuse(args, '--identity', (*options, 'short_term', 'eao_lengths', 'export'))
+    sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
+    _check_writable(args.report)
+    seen, failures = [], []
+    for sequence in sequences:
+        try:
+            samples = as_asked(sequence.open().samples, sequence, _run_options(args, 1))
+            frames = progress(samples, None, sequence.name)
+            seen.append(identity.look(sequence.name, frames, identity.metric_views()))
+        except RgbdKcfError as error:
+            failures.append(Failure(sequence.name, '', str(error)))
+    pairs = identity.all_pairs(seen, identity.metric_views())
+    table = write_identity_report(args.report, pairs, failures, _heading(args))
+    print(table.text())
+    print(f'\nreport: {args.report / PAGE}')
+    _list_failures(failures)
+    return EXIT_FAILURES if failures else 0
+
+
+def _run_options(args: argparse.Namespace, jobs: int) -> RunOptions:
+    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+
+    return RunOptions(
+        rate_hz=args.rate,
+        use_depth=not args.no_depth,
+        short_term=args.short_term,
+        jobs=jobs,
+        fresh=args.fresh,
+        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+    )
+
+
+def _report_everyone(
+    args: argparse.Namespace,
+    sequences: list[Benchmark],
+    contenders: list[Contender],
+    options: RunOptions,
+    failures: list[Failure],
+) -> int:
+    from rgbd_kcf_tracker.evaluation import everyone
+    from rgbd_kcf_tracker.evaluation.jobs import is_done
+    from rgbd_kcf_tracker.evaluation.report import PAGE, write_everyone_report
+
+    results = [
+        everyone.read(args.report, sequence, contender.name)
+        for sequence in sequences
+        for contender in contenders
+        if is_done(args.report, sequence, contender, options)
+    ]
+    table = write_everyone_report(args.report, results, contenders, failures, _heading(args))
+    print(table.text())
+    print(f'\nreport: {args.report / PAGE}')
+    _list_failures(failures)
+    return EXIT_FAILURES if failures else 0
+
+
+def _heading(
+    args: argparse.Namespace,
+    ablated: Sequence[str] = (),
+    eao_lengths: tuple[int, int] | None = None,
+) -> Heading:
+    from rgbd_kcf_tracker.evaluation.report import Heading
+
+    words = ' '.join(['rgbd-kcf', *map(shlex.quote, sys.argv[1:])]) if len(sys.argv) > 1 else ''
+    return Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
 
 
 def _run(
@@ -194,17 +287,20 @@ def _run(
 
 def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
     from rgbd_kcf_tracker.evaluation import contenders
-    from rgbd_kcf_tracker.variants import VARIANTS
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
     if args.variants is not None:
         names = _words(args.variants)
     else:
-        names = [] if args.boxes and not args.ablate else list(VARIANTS)
+        ours = [DEFAULT_VARIANT] if args.everyone else list(VARIANTS)
+        names = [] if args.boxes and not args.ablate else ours
     overrides = _overrides(args.param, names)
     found, ablated = [], []
     for name in names:
         base = contenders.variant(name, overrides.get(name))
         found.append(base)
+        if args.everyone:
+            base.make_set()  # tried out, so that an error comes at once
         if args.ablate and (base.kind == 'variant' and contenders.switches(base)):
             found.extend(contenders.ablations(base))
             ablated.append(base.name)
@@ -257,6 +353,7 @@ def _data(args: argparse.Namespace) -> DatasetOptions:
         duration_s=args.duration,
         size=_size(args.size),
         names=tuple(_words(args.sequences or '')),
+        everyone=args.everyone or args.identity,
     )
 
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""``rgbd-kcf track``: follow a target through a recording."""
+"""``rgbd-kcf track``: follow one target, several, or everyone through a recording."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import argparse
 import sys
 import time
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rgbd_kcf_tracker.cli.common import (
     SOURCE_HELP,
@@ -31,8 +32,11 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.track import Track, Tracker
 
 NAME = 'track'
-HELP = 'follow one target through a recording and write where it is'
+HELP = 'follow one target, several, or everyone through a recording, and write where they are'
 _SAME_TARGET_IOU = 0.5
+
+ONLY = 1
+"""The id of a target that is followed alone, where one is written."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +45,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--init',
         metavar='X,Y,W,H',
-        help="the target's box in the first frame read, in pixels from the top left corner "
-        '(default: the first ground-truth box)',
+        action='append',
+        default=[],
+        help="a target's box in the first frame read, in pixels from the top left corner; may be "
+        'given again, for several targets (default: the first ground-truth box)',
+    )
+    parser.add_argument(
+        '--all',
+        action='store_true',
+        help='follow every person that appears, without being told',
     )
     parser.add_argument(
         '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
@@ -59,7 +70,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--end', metavar='N', type=int, help='frame to stop before (default: all)')
     output = parser.add_argument_group('output')
     output.add_argument(
-        '--output', metavar='FILE.csv', help='a row per frame; - for standard output'
+        '--output',
+        metavar='FILE.csv',
+        help='a row per frame, or per frame and target; - for standard output',
+    )
+    output.add_argument(
+        '--mot', metavar='FILE.txt', help='boxes with ids, as MOT Challenge text: frames from 1'
     )
     output.add_argument('--video', metavar='FILE.mp4', help='the frames with the box drawn on them')
     output.add_argument(
@@ -73,38 +89,47 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.recordings import open_recording
     from rgbd_kcf_tracker.track import require_inside
 
-    tracker, variant = _make_tracker(args)
-    given = None if args.init is None else parse_box(args.init)
+    follower = _make_follower(args)
+    given = [parse_box(text) for text in args.init]
     _check_outputs(args)
     with open_recording(args.source, read_options(args)) as recording:
         start, end = _frame_range(args, recording)
         warnings = Warnings(recording.warnings)
         warnings.show()
-        box, first = _first_box(given, recording, start, end)
+        given, first = _first_boxes(args, given, recording, start, end)
         counts: Counter[str] = Counter()
         boxes: list[Box | None] = []
+        ids: set[int] = set()
+        read = 0
         spent = 0.0
         sinks: _Sinks | None = None
         with ExitStack() as stack:
             frames = progress(recording.frames(start, end), end - start, NAME)
             for number, frame in enumerate(frames, start=start):
                 if sinks is None:
-                    if number == first:
+                    for box in given if number == first else ():
                         require_inside(box, frame)
                     # Opened only now, so that a box outside the image leaves no empty files.
                     sinks = _Sinks(args, recording, stack)
                 begun = time.perf_counter()
-                track = tracker.start(frame, box) if number == first else tracker.update(frame)
+                tracks = follower.follow(frame, given if number == first else ())
                 spent += time.perf_counter() - begun
-                counts[track.state.value] += 1
-                boxes.append(track.box)
-                sinks.write(number, frame, track)
+                counts.update(track.state.value for track in tracks.values())
+                ids.update(tracks)
+                read += 1
+                if not follower.several:
+                    boxes.append(tracks[ONLY].box)
+                sinks.write(number, frame, tracks)
                 warnings.show()
-        success = _success(boxes[first - start :], recording, first, box)
-    rate = len(boxes) / spent if spent > 0 else 0.0
+        success = ''
+        if not follower.several:
+            success = _success(boxes[first - start :], recording, first, given[0])
+    rate = read / spent if spent > 0 else 0.0
     states = ', '.join(f'{count} {state}' for state, count in counts.items())
-    line = f'{recording.name}: {len(boxes)} frames with {variant}: {states}{success}'
-    line += f'; {rate:.0f} frames/s'
+    line = f'{recording.name}: {read} frames with {follower.variant}: '
+    if follower.several:
+        line += f'{len(ids)} targets: '
+    line += f'{states or "nobody"}{success}; {rate:.0f} frames/s'
     if sinks is not None and sinks.written:
         line += f'; wrote {", ".join(sinks.written)}'
     print(line, file=sys.stderr if args.output == '-' else sys.stdout)
@@ -125,20 +150,37 @@ def _success(boxes: list[Box | None], recording: Recording, first: int, start: B
     if bodies is not None and len(bodies) < len(truth):
         bodies = None
     measures = measure_boxes(boxes[: len(truth)], truth, bodies)
-    return f'; success {measures.success:.3f}, IoU {measures.iou:.3f} against the ground truth'
+    return (
+        f'; success {measures.success:.3f}, IoU {measures.iou:.3f}, '
+        f'strangers {measures.strangers:.3f} against the ground truth'
+    )
 
 
 class _Sinks:
     """The outputs that were asked for, closed with ``stack``."""
 
     def __init__(self, args: argparse.Namespace, recording: Recording, stack: ExitStack) -> None:
-        from rgbd_kcf_tracker.recordings import BagWriter, TrackCsvWriter, VideoWriter
+        from rgbd_kcf_tracker.recordings import (
+            BagWriter,
+            MotWriter,
+            TrackCsvWriter,
+            TracksCsvWriter,
+            VideoWriter,
+        )
         from rgbd_kcf_tracker.recordings.copying import output_topics
 
+        self.several = _several(args)
         self.truth = recording.groundtruth
         self.body = recording.groundtruth_body
-        self.written = [p for p in (args.output, args.video, args.bag) if p and p != '-']
-        self.csv = stack.enter_context(TrackCsvWriter(args.output)) if args.output else None
+        self.written = [p for p in (args.output, args.mot, args.video, args.bag) if p and p != '-']
+        self.csv = self.table = self.mot = None
+        if args.output and _several(args):
+            self.table = TracksCsvWriter(args.output)
+            stack.enter_context(self.table)
+        elif args.output:
+            self.csv = stack.enter_context(TrackCsvWriter(args.output))
+        if args.mot:
+            self.mot = stack.enter_context(MotWriter(args.mot))
         self.video = None
         if args.video:
             rate = recording.info().rate_hz or args.fps
@@ -150,7 +192,16 @@ class _Sinks:
                 BagWriter(args.bag, topics, depth_encoding=depth_encoding, annotate=True)
             )
 
-    def write(self, number: int, frame: Frame, track: Track) -> None:
+    def write(self, number: int, frame: Frame, tracks: Mapping[int, Track]) -> None:
+        if self.mot is not None:
+            self.mot.write_tracks(number, tracks)
+        if self.several:
+            if self.table is not None:
+                self.table.write_tracks(number, frame.stamp_ns, tracks)
+            if self.video is not None:
+                self.video.write_tracks(frame, tracks, f'frame {number}')
+            return
+        track = tracks[ONLY]
         annotated = self.truth is not None and number < len(self.truth)
         truth = self.truth[number] if self.truth is not None and annotated else None
         if self.csv is not None:
@@ -166,19 +217,66 @@ class _Sinks:
             self.bag.write_track(frame, track)
 
 
-def _make_tracker(args: argparse.Namespace) -> tuple[Tracker, str]:
+class _One:
+    """One target, whose id is :data:`ONLY`."""
+
+    several = False
+
+    def __init__(self, tracker: Tracker, variant: str) -> None:
+        self._tracker, self.variant = tracker, variant
+
+    def follow(self, frame: Frame, boxes: Sequence[Box]) -> Mapping[int, Track]:
+        """The track in ``frame``; boxes where the target is given."""
+        if boxes:
+            return {ONLY: self._tracker.start(frame, boxes[0])}
+        return {ONLY: self._tracker.update(frame)}
+
+
+class _Several:
+    """Several targets, or everyone."""
+
+    several = True
+
+    def __init__(self, targets: Any, variant: str, everyone: bool) -> None:
+        self._targets, self.variant = targets, variant
+        targets.everyone = everyone
+
+    def follow(self, frame: Frame, boxes: Sequence[Box]) -> Mapping[int, Track]:
+        """The tracks in ``frame`` by id; boxes where targets are given."""
+        from rgbd_kcf_tracker.track import Track, TrackState
+
+        tracks: dict[int, Track] = {}
+        if self._targets.everyone or not boxes:
+            tracks.update(self._targets.update(frame))
+        for box in boxes:
+            who = self._targets.add(frame, box)
+            tracks[who] = Track(box, TrackState.TRACKING, 1.0)
+        return tracks
+
+
+def _several(args: argparse.Namespace) -> bool:
+    return bool(args.all) or len(args.init) > 1
+
+
+def _make_follower(args: argparse.Namespace) -> _One | _Several:
+    import rgbd_kcf_tracker
     from rgbd_kcf_tracker.parameters import with_overrides
     from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters
 
     variant = args.variant or DEFAULT_VARIANT
     parameters = with_overrides(default_parameters(variant), parse_assignments(args.param))
-    return create_tracker(variant, parameters), variant
+    if not _several(args):
+        return _One(create_tracker(variant, parameters), variant)
+    if args.bag:
+        raise ParameterError('--bag holds one target: leave it out, or give one --init')
+    targets = rgbd_kcf_tracker.TargetSet(variant, parameters)  # type: ignore[attr-defined]
+    return _Several(targets, variant, args.all)
 
 
 def _check_outputs(args: argparse.Namespace) -> None:
     """Refuse an output that would overwrite the source, before anything is opened."""
     source = Path(args.source).resolve()
-    for name in ('output', 'video', 'bag'):
+    for name in ('output', 'mot', 'video', 'bag'):
         value = getattr(args, name)
         if value and value != '-' and Path(value).resolve() == source:
             raise RecordingError(f'--{name} {value} is the source itself: give another name')
@@ -196,20 +294,22 @@ def _frame_range(args: argparse.Namespace, recording: Recording) -> tuple[int, i
     return args.start, end
 
 
-def _first_box(given: Box | None, recording: Recording, start: int, end: int) -> tuple[Box, int]:
-    """The box to start on, and the frame it is for."""
-    if given is not None:
+def _first_boxes(
+    args: argparse.Namespace, given: list[Box], recording: Recording, start: int, end: int
+) -> tuple[list[Box], int]:
+    """The boxes to start on, and the frame they are for."""
+    if given or args.all:
         return given, start
     truth = recording.groundtruth
     if truth is None:
         raise BoxError(
             f'{recording.path} has no ground truth: give the target as --init X,Y,W,H '
-            f'(pixels in frame {start})'
+            f'(pixels in frame {start}), or --all for every person'
         )
     for number in range(start, min(end, len(truth))):
         box = truth[number]
         if box is not None:
-            return box, number
+            return [box], number
     raise BoxError(
         f'the ground truth has no box from frame {start} to {end - 1}: '
         'give the target as --init X,Y,W,H, or another range'

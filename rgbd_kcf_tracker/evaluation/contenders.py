@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 
+import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation.store import slug
 from rgbd_kcf_tracker.frame import Frame
@@ -64,6 +65,18 @@ class Contender:
         if self.kind == 'opencv':
             return OpenCvTracker(self.target)
         raise ParameterError(f'{self.name} is read from files, not run')
+
+    def make_set(self) -> Any:
+        """A new ``TargetSet``, which follows several targets.
+
+        Raises:
+            ParameterError: where the tracker follows one target only, or a parameter is wrong.
+        """
+        if self.kind != 'variant':
+            raise ParameterError(f'{self.name} follows one target: it cannot follow everyone')
+        return rgbd_kcf_tracker.TargetSet(  # type: ignore[attr-defined]
+            self.target, self.parameters()
+        )
 
     def parameters(self) -> Any:
         """The parameters of a variant, overrides applied."""

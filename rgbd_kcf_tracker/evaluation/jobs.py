@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -16,9 +16,10 @@ from typing import Any
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
-from rgbd_kcf_tracker.evaluation import boxfiles
+from rgbd_kcf_tracker.evaluation import boxfiles, everyone
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import (
+    EVERYONE,
     Opened,
     Sample,
     Sequence,
@@ -36,6 +37,9 @@ from rgbd_kcf_tracker.evaluation.store import (
     write_truth,
 )
 from rgbd_kcf_tracker.geometry import Intrinsics
+
+_FORMAT = 2
+"""Of what a run leaves; another one is not read, but run again."""
 
 _CODE = (
     'geometry.py', 'frame.py', 'track.py', 'parameters.py', 'variants.py',
@@ -124,13 +128,17 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
     parts = [
         sequence.identity, contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,
-        repr(options.intrinsics),
+        repr(options.intrinsics), _FORMAT,
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
 
 
 def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
     """Whether the same run has been made: same frames, parameters, code and options."""
+    if sequence.kind == EVERYONE:
+        return everyone.is_done(
+            folder, sequence, contender.name, run_key(sequence, contender, options)
+        )
     tracks = tracks_path(folder, contender.name, sequence.name)
     if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
         return False
@@ -154,6 +162,8 @@ def run_job(job: Job) -> list[Failure]:
 def _run_sequence(job: Job) -> list[Failure]:
     sequence, options = job.sequence, job.options
     opened = sequence.open()
+    if sequence.kind == EVERYONE:
+        return _run_everyone(job, opened)
     passes: dict[str, OnePass] = {}
     restarts: dict[str, WithRestarts] = {}
     for contender in job.contenders:
@@ -164,7 +174,9 @@ def _run_sequence(job: Job) -> list[Failure]:
     thumbnails, samples, size = Thumbnails(), [], (0, 0)
     for sample in _samples(opened, sequence, options):
         size = sample.frame.width, sample.frame.height
-        samples.append((sample.frame.stamp_ns, sample.visible, sample.body, sample.fraction))
+        samples.append(
+            (sample.frame.stamp_ns, sample.visible, sample.body, sample.fraction, sample.judged)
+        )
         thumbnails.feed(sample.frame)
         for one in (*passes.values(), *restarts.values()):
             one.feed(sample)
@@ -174,7 +186,7 @@ def _run_sequence(job: Job) -> list[Failure]:
     body = [s[2] for s in samples] if opened.has_body else None
     write_truth(
         truth_path(job.folder, sequence.name),
-        stamps, [s[1] for s in samples], body, [s[3] for s in samples],
+        stamps, [s[1] for s in samples], body, [s[3] for s in samples], [s[4] for s in samples],
     )  # fmt: skip
     _write_thumbnails(job.folder / 'thumbs' / slug(sequence.name), thumbnails)
 
@@ -194,6 +206,14 @@ def _run_sequence(job: Job) -> list[Failure]:
             | {'image_size': size, 'thumbnail_scale': thumbnails.scale},
         )
     return failures
+
+
+def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
+    sequence, options = job.sequence, job.options
+    samples = as_asked(opened.samples, sequence, options)
+    keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
+    failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
+    return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]
 
 
 def _write_thumbnails(folder: Path, thumbnails: Thumbnails) -> None:
@@ -246,10 +266,18 @@ def _meta(
 
 
 def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterator[Sample]:
-    samples: Any = from_first_view(opened.samples)
-    if options.rate_hz is not None and sequence.kind != 'sim':  # scenes are rendered at their rate
+    yield from as_asked(from_first_view(opened.samples), sequence, options)
+
+
+def as_asked(
+    samples: Iterable[Sample], sequence: Sequence, options: RunOptions
+) -> Iterator[Sample]:
+    """The samples at the rate, with the camera, and with the depth or not, that were asked for."""
+    # Scenes are rendered at their rate, by their own camera.
+    recorded = sequence.kind != 'sim' and (sequence.kind != EVERYONE or sequence.path is not None)
+    if options.rate_hz is not None and recorded:
         samples = at_rate(samples, options.rate_hz)
-    if options.intrinsics is not None and sequence.kind != 'sim':
+    if options.intrinsics is not None and recorded:
         samples = with_intrinsics(samples, options.intrinsics)
     if not options.use_depth:
         samples = without_depth(samples)

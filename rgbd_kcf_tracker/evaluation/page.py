@@ -25,7 +25,7 @@ STRIPS = 3
 TEMPLATE = 'report.html.j2'
 
 
-def render(measured: Measured, content: Mapping[str, Any]) -> str:
+def render(content: Mapping[str, Any]) -> str:
     """The page as HTML."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader('rgbd_kcf_tracker.evaluation'),
@@ -33,14 +33,10 @@ def render(measured: Measured, content: Mapping[str, Any]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    frames = {r.sequence: len(r.stamps_ns) for r in measured.results}
     return environment.get_template(TEMPLATE).render(
         **content,
         version=rgbd_kcf_tracker.__version__,
         date=datetime.now(timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
-        sequences=len(measured.sequences),
-        frames=sum(frames.values()),
-        trackers=measured.trackers,
     )
 
 

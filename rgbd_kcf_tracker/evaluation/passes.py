@@ -74,7 +74,8 @@ class OnePass:
 class WithRestarts(OnePass):
     """A tracker under VOT's short-term protocol: started again a few frames after each failure.
 
-    Frames in which the target is absent are gone through, but neither fail nor count.
+    Frames in which the target is absent, or that are not judged, are gone through, but neither fail
+    nor count.
 
     Attributes:
         codes: a :class:`vot.Code` per frame.
@@ -93,7 +94,7 @@ class WithRestarts(OnePass):
         return vot.ShortTermRun(np.array(self.codes, np.int64)[there], overlaps[there])
 
     def _step(self, tracker: Tracker, sample: Sample) -> None:
-        box = sample.visible
+        box = sample.visible if sample.judged else None
         self._wait = max(0, self._wait - 1)
         before = time.perf_counter()
         track, code, overlap = _NO_BOX, vot.Code.SKIPPED, math.nan if box is None else 0.0

@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path, truth_path
 from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, measure
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
 from rgbd_kcf_tracker.evaluation.store import (
     read_json,
@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.evaluation.store import (
 
 HEADER = (
     'tracker', 'sequence', 'frame', 'stamp_ns', 'there', 'said', 'iou', 'dx_px', 'dy_px', 'ratio',
-    'score', 'visible_fraction', 'ms',
+    'score', 'visible_fraction', 'ms', 'judged',
 )  # fmt: skip
 
 
@@ -50,6 +50,7 @@ class Result:
         frames: the comparison with the truth, the first frame included.
         fraction: ``(N,)`` visible share, NaN where unknown.
         milliseconds: ``(N,)`` time of each call, NaN where unknown (boxes from files).
+        judged: ``(N,)`` False where the truth leaves open what is right: the frame does not count.
     """
 
     tracker: str
@@ -58,12 +59,16 @@ class Result:
     frames: Comparison
     fraction: Array
     milliseconds: Array
+    judged: Mask
 
     @property
     def counted(self) -> Comparison:
-        """The frames that count: all but the first."""
-        f = self.frames
-        return Comparison(f.said[1:], f.there[1:], f.overlap[1:], f.offset[1:], f.score[1:])
+        """The frames that count: all that are judged but the first."""
+        f, keep = self.frames, self.judged.copy()
+        keep[:1] = False
+        return Comparison(
+            f.said[keep], f.there[keep], f.overlap[keep], f.offset[keep], f.score[keep]
+        )
 
     def measures(self) -> Measures:
         """All measures of the frames that count."""
@@ -150,7 +155,9 @@ def _collect_one(
     ms[: len(times)] = times
     frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
     collected.results.append(
-        Result(contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, ms)
+        Result(
+            contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, ms, truth.judged
+        )
     )
     if 'short_term' in meta:
         run = meta['short_term']
@@ -174,6 +181,7 @@ def write_per_frame(path: Path, results: Iterable[Result]) -> None:
                     r.tracker, r.sequence, i, stamp, int(f.there[i]), int(f.said[i]),
                     *('' if math.isnan(v) else f'{v:.6g}' for v in numbers),
                     '' if math.isnan(r.milliseconds[i]) else f'{r.milliseconds[i]:.2f}',
+                    int(r.judged[i]),
                 )
             )  # fmt: skip
     write_atomically(path, text.getvalue())
@@ -213,5 +221,7 @@ def read_per_frame(path: Path) -> list[Result]:
             offset=table[:, 3:5],
             score=table[:, 6],
         )
-        results.append(Result(tracker, sequence, stamps, frames, table[:, 7], table[:, 8]))
+        results.append(
+            Result(tracker, sequence, stamps, frames, table[:, 7], table[:, 8], table[:, 9] != 0)
+        )
     return results

@@ -16,9 +16,10 @@ from matplotlib.figure import Figure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
-from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability
+from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE, Reliability
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.perframe import Result
+from rgbd_kcf_tracker.evaluation.tables import REAL, SIMULATED, Scored
 
 # Okabe and Ito's colours, which people with any colour vision can tell apart.
 PALETTE = (
@@ -120,29 +121,64 @@ def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
     return _png(figure)
 
 
-def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
+def reliability_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
     """Share of right boxes over published score, and how many boxes have that score."""
-    count = len(tables)
-    columns = min(4, count)
-    rows = -(-count // columns)
+    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    panels = [
+        (f'{tracker}, {data} data', scored.reliability, palette[tracker])
+        for (tracker, data), scored in found.items()
+    ]
+    return _calibration(panels, 'score', 'boxes')
+
+
+def pairs_plot(found: Mapping[str, Reliability]) -> bytes:
+    """Share of pairs of one person over the probability given."""
+    palette = colors(list(found))
+    return _calibration([(n, t, palette[n]) for n, t in found.items()], 'probability', 'pairs')
+
+
+def _calibration(panels: Sequence[tuple[str, Reliability, str]], across: str, what: str) -> bytes:
+    columns = min(4, len(panels))
+    rows = -(-len(panels) // columns)
     figure = _figure(3.1 * columns + 0.4, 3.2 * rows)
-    palette = colors(list(tables))
-    for index, (tracker, table) in enumerate(tables.items()):
+    for index, (name, table, color) in enumerate(panels):
         axes = figure.add_subplot(rows, columns, index + 1)
         centers = (table.edges[:-1] + table.edges[1:]) / 2
         share = table.counts / max(1, table.counts.sum())
-        axes.bar(centers, share, width=0.096, color=_ABSENT, label='share of boxes')
+        axes.bar(centers, share, width=0.096, color=_ABSENT, label=f'share of {what}')
         axes.plot([0, 1], [0, 1], '--', color='#888888', lw=1)
         known = table.counts > 0
         axes.plot(
-            table.mean_score[known], table.hit_rate[known], 'o-', color=palette[tracker], ms=4,
-            label='right boxes',
+            table.mean_score[known], table.hit_rate[known], 'o-', color=color, ms=4,
+            label=f'right {what}',
         )  # fmt: skip
-        axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel='score')
-        axes.set_title(f'{tracker}\nerror {table.expected_error:.3f}', fontsize=9)
+        axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel=across)
+        axes.set_title(f'{name}\nerror {table.expected_error:.3f}', fontsize=9)
         _tidy(axes)
         if index == 0:
             axes.legend(fontsize=7, frameon=False, loc='upper left')
+    return _png(figure)
+
+
+def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
+    """Of the boxes of a score and above, the share on the target; real and simulated data apart."""
+    figure = _figure(5.2, 3.6)
+    axes = figure.add_subplot()
+    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    lines = {REAL: '-', SIMULATED: '--'}
+    for (tracker, data), scored in found.items():
+        curve = scored.on_target
+        axes.plot(
+            curve.limits, curve.shares, lines[data], color=palette[tracker], lw=1.8,
+            label=f'{tracker}, {data} data',
+        )  # fmt: skip
+    axes.axvline(SURE, color='#888888', lw=0.8, ls=':')
+    axes.set(
+        xlim=(0, 1), ylim=(0, 1.02), xlabel='score and above', ylabel='boxes on the target',
+        title='What a score is worth',
+    )  # fmt: skip
+    _tidy(axes)
+    axes.legend(fontsize=8, frameon=False, loc='lower left')
     return _png(figure)
 
 

@@ -12,8 +12,18 @@ from typing import Any
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation import page, plots, tables, thesis_tables
+from rgbd_kcf_tracker.evaluation import (
+    everyone_tables,
+    identity_tables,
+    page,
+    plots,
+    tables,
+    thesis_tables,
+)
 from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.datasets.base import EVERYONE
+from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
+from rgbd_kcf_tracker.evaluation.identity import Pairs
 from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
@@ -81,12 +91,14 @@ def write_report(
         'reliability': reliability,
     }
     every = _all_tables(content)
-    for table in every:
-        write_atomically(folder / 'tables' / f'{slug(table.key)}.csv', table.csv())
-    write_atomically(
-        folder / 'tables.md', '\n'.join(f'### {t.title}\n\n{t.markdown()}\n' for t in every)
-    )
-    numbers = _numbers(measured, every, curves, contenders, failures, heading)
+    _write_tables(folder, every)
+    numbers = _numbers(every, contenders, failures, heading) | {
+        'sequences': {
+            name: {'scenario': i.scenario, 'kind': i.kind, 'categories': dict(i.categories)}
+            for name, i in measured.infos.items()
+        },
+        'curves': curves,
+    }
     write_json(folder / 'report.json', numbers, indent=1)
 
     palette = plots.colors(measured.trackers)
@@ -97,23 +109,82 @@ def write_report(
         'long_term_plot': page.uri(plots.long_term_plot(long_curves)),
         'strips': page.strip_figures(folder, measured, main, palette),
         'sequence_plots': page.sequence_figures(measured, palette),
-        'failures': failures,
         'unmeasured': collected.unmeasured,
         'main': main,
-        'palette': palette,
-        'title': f'Trackers on {_short(heading.datasets)}',
-        'dataset': ', '.join(heading.datasets),
-        'options': heading.options,
-        'command': heading.command,
     }
     if reliabilities:
         content['reliability_plot'] = page.uri(plots.reliability_plot(reliabilities))
+        content['honesty_plot'] = page.uri(plots.honesty_plot(reliabilities))
     if collected.short_term:
         content['eao_plot'] = page.uri(
             plots.expected_overlap_plot(collected.short_term, heading.eao_lengths)
         )
-    write_atomically(folder / PAGE, page.render(measured, content))
+    frames = {r.sequence: len(r.stamps_ns) for r in measured.results}
+    content |= _head(heading, failures, palette, frames)
+    write_atomically(folder / PAGE, page.render(content))
     return measured
+
+
+def write_everyone_report(
+    folder: Path,
+    results: Sequence[EveryoneResult],
+    contenders: Sequence[Contender],
+    failures: Sequence[Failure],
+    heading: Heading,
+) -> Table:
+    """Write the report of recordings in which everyone was followed.
+
+    Returns:
+        The overview, for printing.
+
+    Raises:
+        DatasetError: where nothing could be measured.
+    """
+    _write_failures(folder / 'failures.txt', failures)
+    if not results:
+        raise DatasetError(_why_nothing(failures))
+    every = [everyone_tables.overview(results), everyone_tables.by_recording(results)]
+    _write_tables(folder, every)
+    numbers = _numbers(every, contenders, failures, heading) | {
+        'sequences': {r.sequence: {'scenario': r.scenario, 'kind': EVERYONE} for r in results},
+    }
+    write_json(folder / 'report.json', numbers, indent=1)
+    palette = plots.colors(list(dict.fromkeys(r.tracker for r in results)))
+    content = {'everyone': every} | _head(
+        heading, failures, palette, {r.sequence: r.frames for r in results}
+    )
+    write_atomically(folder / PAGE, page.render(content))
+    return every[0]
+
+
+def write_identity_report(
+    folder: Path, pairs: Sequence[Pairs], failures: Sequence[Failure], heading: Heading
+) -> Table:
+    """Write the report of how well people are told apart.
+
+    Returns:
+        The overview, for printing.
+
+    Raises:
+        DatasetError: where nothing could be measured.
+    """
+    _write_failures(folder / 'failures.txt', failures)
+    if not any(len(p.probability) for p in pairs):
+        raise DatasetError(
+            _why_nothing(failures) if failures else 'no two sightings could be compared'
+        )
+    calibration, reliabilities = identity_tables.calibration(pairs)
+    every = [identity_tables.overview(pairs), calibration]
+    _write_tables(folder, every)
+    write_atomically(folder / 'pairs.csv', identity_tables.pairs_csv(pairs))
+    frames = {s.recording: s.frames for p in pairs for s in p.seen}
+    write_json(folder / 'report.json', _numbers(every, (), failures, heading), indent=1)
+    content = {
+        'identity': every,
+        'identity_plot': page.uri(plots.pairs_plot(reliabilities)),
+    } | _head(heading, failures, {}, frames)
+    write_atomically(folder / PAGE, page.render(content))
+    return every[0]
 
 
 def main_tracker(
@@ -126,6 +197,34 @@ def main_tracker(
     ours = [c.name for c in contenders if c.kind == 'variant']
     wanted = (*ablated, 'metric', *reversed(ours))
     return next((name for name in wanted if name in measured), measured[-1])
+
+
+def _head(
+    heading: Heading,
+    failures: Sequence[Failure],
+    palette: Mapping[str, str],
+    frames: Mapping[str, int],
+) -> dict[str, Any]:
+    """What stands at the top and at the end of every page; frames by sequence."""
+    return {
+        'failures': failures,
+        'palette': palette,
+        'trackers': list(palette),
+        'sequences': len(frames),
+        'frames': sum(frames.values()),
+        'title': f'Trackers on {_short(heading.datasets)}',
+        'dataset': ', '.join(heading.datasets),
+        'options': heading.options,
+        'command': heading.command,
+    }
+
+
+def _write_tables(folder: Path, every: Sequence[Table]) -> None:
+    for table in every:
+        write_atomically(folder / 'tables' / f'{slug(table.key)}.csv', table.csv())
+    write_atomically(
+        folder / 'tables.md', '\n'.join(f'### {t.title}\n\n{t.markdown()}\n' for t in every)
+    )
 
 
 def _short(datasets: Sequence[str]) -> str:
@@ -143,9 +242,7 @@ def _all_tables(content: Mapping[str, Any]) -> list[Table]:
 
 
 def _numbers(
-    measured: Measured,
     every: Sequence[Table],
-    curves: Mapping[str, Mapping[str, Any]],
     contenders: Sequence[Contender],
     failures: Sequence[Failure],
     heading: Heading,
@@ -157,15 +254,10 @@ def _numbers(
         'trackers': {
             c.name: {'kind': c.kind, 'target': c.target, **dict(c.overrides)} for c in contenders
         },
-        'sequences': {
-            name: {'scenario': i.scenario, 'kind': i.kind, 'categories': dict(i.categories)}
-            for name, i in measured.infos.items()
-        },
         'tables': {
             t.key: {'title': t.title, 'columns': t.columns, 'rows': t.rows, 'note': t.note}
             for t in every
         },
-        'curves': curves,
         'failures': [
             {'sequence': f.sequence, 'tracker': f.tracker, 'reason': f.reason} for f in failures
         ],

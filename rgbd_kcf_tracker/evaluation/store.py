@@ -15,7 +15,8 @@ import json
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import TrackCsvWriter
 from rgbd_kcf_tracker.recordings.results import HEADER
@@ -31,7 +32,7 @@ from rgbd_kcf_tracker.track import Track
 
 TRUTH_HEADER = (
     'frame', 'stamp_ns', 'x', 'y', 'width', 'height',
-    'body_x', 'body_y', 'body_width', 'body_height', 'visible_fraction',
+    'body_x', 'body_y', 'body_width', 'body_height', 'visible_fraction', 'judged',
 )  # fmt: skip
 
 
@@ -53,12 +54,14 @@ class Truth:
         visible: ``(N, 4)``, NaN where absent.
         body: ``(N, 4)`` or None where not known.
         fraction: ``(N,)`` visible share, NaN where unknown.
+        judged: ``(N,)`` False where the truth leaves open what is right.
     """
 
     stamps_ns: tuple[int, ...]
     visible: Array
     body: Array | None
     fraction: Array
+    judged: Mask
 
 
 def slug(name: str) -> str:
@@ -66,18 +69,25 @@ def slug(name: str) -> str:
     return re.sub(r'[^A-Za-z0-9.=-]+', '_', name).strip('._') or '_'
 
 
-def write_atomically(path: Path, data: str | bytes) -> None:
-    """Write a file under another name, then move it into place."""
+@contextmanager
+def moved_into_place(path: Path) -> Iterator[Path]:
+    """Another name for a file to be written, which gets its own when it is whole."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Write a file under another name, then move it into place."""
+    with moved_into_place(path) as temporary:
         if isinstance(data, str):
             temporary.write_text(data, encoding='utf-8')
         else:
             temporary.write_bytes(data)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_json(path: Path, value: Any, indent: int | None = None) -> None:
@@ -102,15 +112,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:
     """One row per frame, as ``rgbd-kcf track --output`` writes them."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        with TrackCsvWriter(temporary) as writer:
-            for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True)):
-                writer.write_track(index, stamp, track)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with moved_into_place(path) as temporary, TrackCsvWriter(temporary) as writer:
+        for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True)):
+            writer.write_track(index, stamp, track)
 
 
 def read_tracks(path: Path) -> Tracks:
@@ -137,12 +141,15 @@ def write_truth(
     visible: Sequence[Box | None],
     body: Sequence[Box | None] | None,
     fraction: Sequence[float | None],
+    judged: Sequence[bool],
 ) -> None:
     """One row per frame; empty cells where there is nothing."""
     whole = body if body is not None else [None] * len(visible)
     rows = [
-        (i, stamp, *_cells(v), *_cells(b), '' if f is None else f'{f:.4f}')
-        for i, (stamp, v, b, f) in enumerate(zip(stamps_ns, visible, whole, fraction, strict=True))
+        (i, stamp, *_cells(v), *_cells(b), '' if f is None else f'{f:.4f}', int(j))
+        for i, (stamp, v, b, f, j) in enumerate(
+            zip(stamps_ns, visible, whole, fraction, judged, strict=True)
+        )
     ]
     write_atomically(path, _csv(TRUTH_HEADER, rows))
 
@@ -162,7 +169,8 @@ def read_truth(path: Path) -> Truth:
     except ValueError:
         raise DatasetError(f'{path}: a cell is no number: delete the file and run again') from None
     body = table[:, 4:8]
-    return Truth(stamps, table[:, :4], None if np.isnan(body).all() else body, table[:, 8])
+    whole = None if np.isnan(body).all() else body
+    return Truth(stamps, table[:, :4], whole, table[:, 8], table[:, 9] != 0)
 
 
 def _csv(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -18,7 +18,10 @@ from rgbd_kcf_tracker.evaluation.metrics import (
     otb,
 )
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU, UNDETERMINED, Confusion
+from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
+
+REAL, SIMULATED = 'real', 'simulated'
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,8 @@ OVERVIEW: tuple[Column, ...] = (
     Column('success_auc', 'success AUC %'),
     Column('iou', 'IoU %'),
     Column('recall_of_absence', 'recall of absence %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
     Column('tp', 'TP %'),
     Column('fp', 'FP %'),
     Column('fn', 'FN %'),
@@ -50,9 +55,19 @@ BY_SCENARIO: tuple[Column, ...] = (
     Column('success', 'success %'),
     Column('iou', 'IoU %'),
     Column('recall_of_absence', 'recall of absence %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
     Column('tp', 'TP %'),
     Column('tn', 'TN %'),
     Column('precision_20px', 'P@20px %'),
+)
+
+
+PER_SEQUENCE: tuple[Column, ...] = (
+    Column('success', 'success %'),
+    Column('iou', 'IoU %'),
+    Column('strangers', 'strangers %'),
+    Column('returns', 'returns %'),
 )
 
 
@@ -115,9 +130,9 @@ def by_scenario(measured: Measured) -> list[Table]:
 
 
 def by_sequence(measured: Measured) -> Table:
-    """Success and IoU of every tracker on every sequence."""
+    """What counts most, of every tracker on every sequence."""
     columns = ['sequence', 'scenario', 'frames']
-    columns += [f'{t}: {what}' for t in measured.trackers for what in ('success %', 'IoU %')]
+    columns += [f'{t}: {c.heading}' for t in measured.trackers for c in PER_SEQUENCE]
     rows = []
     for sequence in measured.sequences:
         cells: list[Cell] = []
@@ -125,14 +140,22 @@ def by_sequence(measured: Measured) -> Table:
         for tracker in measured.trackers:
             m, r = measured.of(tracker, sequence), measured.result(tracker, sequence)
             frames = len(r.stamps_ns) if r else frames
-            cells += [scaled(m.success, 100), scaled(m.iou, 100)] if m else [None, None]
+            cells += [scaled(getattr(m, c.name), c.scale) if m else None for c in PER_SEQUENCE]
         rows.append((sequence, measured.infos[sequence].scenario, frames, *cells))
     return Table('sequences', 'Every sequence', tuple(columns), tuple(rows))
 
 
 def ablation(measured: Measured, base: str) -> Table:
     """The variant, and what it loses without each of its ingredients."""
-    columns = ('success', 'iou', 'recall_of_absence', 'tp', 'precision_20px')
+    columns = (
+        'success',
+        'iou',
+        'recall_of_absence',
+        'strangers',
+        'returns',
+        'tp',
+        'precision_20px',
+    )
     full = measured.mean(base)
     rows = []
     for tracker in measured.trackers:
@@ -147,7 +170,8 @@ def ablation(measured: Measured, base: str) -> Table:
                 cells.append(None if tracker == base else scaled(loss, 100))
         rows.append((tracker, *cells))
     headings = (
-        'success %', 'change', 'IoU %', 'change', 'recall of absence %', 'TP %', 'P@20px %',
+        'success %', 'change', 'IoU %', 'change', 'recall of absence %', 'strangers %', 'returns %',
+        'TP %', 'P@20px %',
     )  # fmt: skip
     return Table(
         f'ablation_{base}',
@@ -209,32 +233,75 @@ def long_term(measured: Measured) -> tuple[Table, dict[str, longterm.LongTerm]]:
     ), curves
 
 
-def reliability(measured: Measured) -> tuple[Table, dict[str, calibration.Reliability]]:
-    """Whether scores mean what they say: per tenth of score, the share of boxes that are right."""
-    tables: dict[str, calibration.Reliability] = {}
+@dataclass(frozen=True, slots=True, eq=False)
+class Scored:
+    """The published scores of one tracker on real or on simulated data, held against the truth."""
+
+    reliability: calibration.Reliability
+    on_target: calibration.Honesty
+
+
+def reliability(measured: Measured) -> tuple[Table, dict[tuple[str, str], Scored]]:
+    """Whether scores mean what they say, for real and simulated data apart.
+
+    Returns:
+        The table, and what is drawn of each tracker and kind of data (:data:`REAL`,
+        :data:`SIMULATED`); trackers whose scores never vary are not among them.
+    """
+    found: dict[tuple[str, str], Scored] = {}
     rows: list[tuple[Cell, ...]] = []
     for tracker in measured.trackers:
-        own = [r.counted for r in measured.results if r.tracker == tracker]
-        scores = np.concatenate([c.score[c.said] for c in own])
-        hits = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= HIT_IOU for c in own])
-        if not len(scores) or np.ptp(scores) == 0:
-            rows.append((tracker, len(scores), *[None] * (2 + calibration.BINS)))
-            continue
-        tables[tracker] = table = calibration.reliability(scores, hits)
-        rates = (scaled(v, 100) for v in table.hit_rate)
-        error = scaled(table.expected_error, 100)
-        rows.append((tracker, int(table.counts.sum()), error, table.brier, *rates))
+        for data in (REAL, SIMULATED):
+            own = [
+                r.counted
+                for r in measured.results
+                if r.tracker == tracker and data == data_of(measured, r.sequence)
+            ]
+            if not own:
+                continue
+            scores = np.concatenate([c.score[c.said] for c in own])
+            hits = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= HIT_IOU for c in own])
+            near = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= STRANGER_IOU for c in own])
+            if not len(scores) or np.ptp(scores) == 0:
+                rows.append((tracker, data, len(scores), *[None] * (5 + calibration.BINS)))
+                continue
+            on_target = calibration.honesty(scores, near)
+            right = calibration.honesty(scores, hits)
+            binned = calibration.reliability(scores, hits)
+            found[tracker, data] = Scored(binned, on_target)
+            rows.append(
+                (
+                    tracker,
+                    data,
+                    len(scores),
+                    on_target.sure,
+                    scaled(on_target.sure_share, 100),
+                    scaled(right.sure_share, 100),
+                    scaled(binned.expected_error, 100),
+                    binned.brier,
+                    *(scaled(v, 100) for v in binned.hit_rate),
+                )
+            )
     edges = np.linspace(0.0, 1.0, calibration.BINS + 1)
-    bins = [f'{a:.1f}-{b:.1f}' for a, b in pairwise(edges)]
+    sure = f'of {calibration.SURE:g} and more'
     return Table(
         'reliability',
         'Reliability of scores: percent of boxes that are right, by published score',
-        ('tracker', 'boxes', 'calibration error %', 'Brier', *bins),
+        (
+            'tracker', 'data', 'boxes', sure, f'{sure}: on the target %', f'{sure}: right %',
+            'calibration error %', 'Brier', *(f'{a:.1f}-{b:.1f}' for a, b in pairwise(edges)),
+        ),
         tuple(rows),
         digits=2,
-        note=f'A box is right where its IoU with the visible target is at least {HIT_IOU}. '
-        'Trackers that publish no score have no row of numbers.',
-    ), tables
+        note=f'A box is right where its IoU with the visible target is at least {HIT_IOU}, and on '
+        f'the target where it is at least {STRANGER_IOU}: else it is on a stranger. Trackers that '
+        'publish no score have no row of numbers.',
+    ), found  # fmt: skip
+
+
+def data_of(measured: Measured, sequence: str) -> str:
+    """Whether a sequence is real or simulated; a scene written as a recording counts as real."""
+    return SIMULATED if measured.infos[sequence].kind == 'sim' else REAL
 
 
 def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_compressed_depth,
     decode_depth,
 )
+from rgbd_kcf_tracker.recordings.mot import MotWriter, Sightings, read_mot
 from rgbd_kcf_tracker.recordings.opening import open_recording
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.pairing import Pair, PairingCounts, StampPairer
@@ -26,7 +27,7 @@ from rgbd_kcf_tracker.recordings.recording import (
     RecordingInfo,
     StreamInfo,
 )
-from rgbd_kcf_tracker.recordings.results import TrackCsvWriter
+from rgbd_kcf_tracker.recordings.results import TrackCsvWriter, TracksCsvWriter
 from rgbd_kcf_tracker.recordings.sequence_writer import SequenceWriter
 from rgbd_kcf_tracker.recordings.video import VideoWriter
 
@@ -37,15 +38,18 @@ __all__ = [
     'KINECT2_SD',
     'BagWriter',
     'CameraTopics',
+    'MotWriter',
     'Pair',
     'PairingCounts',
     'ReadOptions',
     'Recording',
     'RecordingInfo',
     'SequenceWriter',
+    'Sightings',
     'StampPairer',
     'StreamInfo',
     'TrackCsvWriter',
+    'TracksCsvWriter',
     'VideoWriter',
     'decode_color',
     'decode_compressed_color',
@@ -53,4 +57,5 @@ __all__ = [
     'decode_depth',
     'draw_track',
     'open_recording',
+    'read_mot',
 ]

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import cv2
 import numpy as np
@@ -24,6 +25,8 @@ STATE_COLORS: dict[TrackState, tuple[int, int, int]] = {
 TRUTH_COLOR = (255, 255, 255)
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
+# Multiples of it, modulo 1, lie as far from each other as can be.
+_GOLDEN = (math.sqrt(5) - 1) / 2
 _BAR = 0.55  # how much of the picture the bar behind the words takes away
 
 
@@ -47,21 +50,92 @@ def draw_track(
     """
     out = np.array(image, order='C')
     color = STATE_COLORS[track.state]
-    scale = max(0.42, min(out.shape[0] / 900, out.shape[1] / 1100))
-    thickness = max(1, round(3.2 * scale))
+    scale, thickness = _sizes(out)
     if truth is not None:
         _rectangle(out, truth, (0, 0, 0), 3)
         _rectangle(out, truth, TRUTH_COLOR, 1)
     if track.box is not None:
         _rectangle(out, track.box, (0, 0, 0), thickness + 2)
         _rectangle(out, track.box, color, thickness)
-    _bar(out, track, caption, scale, color)
+    _bar(out, _words(track), caption, scale, color)
     return out
+
+
+def draw_tracks(
+    image: npt.NDArray[np.uint8], tracks: Mapping[int, Track], *, caption: str = ''
+) -> npt.NDArray[np.uint8]:
+    """A copy of a picture with the box and the id of each target, a colour for each id.
+
+    Args:
+        image: ``(H, W, 3)`` uint8 BGR; left as it is.
+        tracks: what the tracker says, by id.
+        caption: words at the right of the bar, such as the frame's number.
+
+    Returns:
+        ``(H, W, 3)`` uint8 BGR.
+    """
+    out = np.array(image, order='C')
+    scale, thickness = _sizes(out)
+    seen = 0
+    for who, track in sorted(tracks.items()):
+        if track.box is None:
+            continue
+        seen += 1
+        color = id_color(who)
+        _rectangle(out, track.box, (0, 0, 0), thickness + 2)
+        _rectangle(out, track.box, color, thickness)
+        _label(out, str(who), track.box, color, scale, thickness)
+    state = TrackState.TRACKING if seen else TrackState.OCCLUDED
+    words = f'{seen} in view' + (f', {len(tracks) - seen} not' if seen < len(tracks) else '')
+    _bar(out, words, caption, scale, STATE_COLORS[state])
+    return out
+
+
+def id_color(who: int) -> tuple[int, int, int]:
+    """A bright BGR colour for an id; neighbours differ most."""
+    hue = round(180 * (who * _GOLDEN % 1.0)) % 180
+    pixel = cv2.cvtColor(np.array([[[hue, 190, 255]]], np.uint8), cv2.COLOR_HSV2BGR)[0, 0]
+    return int(pixel[0]), int(pixel[1]), int(pixel[2])
+
+
+def _label(
+    image: npt.NDArray[np.uint8],
+    words: str,
+    box: Box,
+    color: tuple[int, int, int],
+    scale: float,
+    thickness: int,
+) -> None:
+    """Words on a patch of the colour in the upper left corner of what shows of the box."""
+    shown = box.clipped(image.shape[1], image.shape[0])
+    if shown is None:
+        return
+    (width, height), _ = cv2.getTextSize(words, _FONT, scale, 1)
+    left, top = round(shown.x), round(shown.y)
+    right, bottom = left + width + 2 * thickness + 2, top + height + 2 * thickness + 4
+    cv2.rectangle(image, (left, top), (right, bottom), color, -1)
+    at = left + thickness + 1, bottom - thickness - 2
+    cv2.putText(image, words, at, _FONT, scale, (0, 0, 0), 1, cv2.LINE_AA)
+
+
+def _sizes(image: npt.NDArray[np.uint8]) -> tuple[float, int]:
+    """Scale of words and thickness of lines that go with a picture's size."""
+    scale = max(0.42, min(image.shape[0] / 900, image.shape[1] / 1100))
+    return scale, max(1, round(3.2 * scale))
+
+
+def _words(track: Track) -> str:
+    words = track.state.value
+    if track.box is not None and not math.isnan(track.score):  # NaN: nobody said it
+        words += f'   score {track.score:.2f}'
+    if track.depth is not None:
+        words += f'   {track.depth:.2f} m'
+    return words
 
 
 def _bar(
     image: npt.NDArray[np.uint8],
-    track: Track,
+    words: str,
     caption: str,
     scale: float,
     color: tuple[int, int, int],
@@ -76,11 +150,6 @@ def _bar(
     cv2.circle(
         image, (pad + text_height // 2, height // 2), text_height // 2, color, -1, cv2.LINE_AA
     )
-    words = track.state.value
-    if track.box is not None and not math.isnan(track.score):  # NaN: nobody said it
-        words += f'   score {track.score:.2f}'
-    if track.depth is not None:
-        words += f'   {track.depth:.2f} m'
     _text(image, words, (2 * pad + text_height, baseline), scale, weight)
     (width, _), _ = cv2.getTextSize(words, _FONT, scale, weight)
     (right, _), _ = cv2.getTextSize(caption, _FONT, scale, weight)

@@ -1,13 +1,14 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A tracker's answers as a CSV file, a row per frame."""
+"""A tracker's answers as a CSV file, a row per frame, or per frame and target."""
 
 from __future__ import annotations
 
 import math
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import TextIO
@@ -16,6 +17,16 @@ from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.track import Track
 
 HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
+
+
+def row(number: int, stamp_ns: int, track: Track) -> str:
+    """The line of frame ``number``; cells are empty where there is no box."""
+    cells = [str(number), str(stamp_ns), '', '', '', '', track.state.value, '', '']
+    if track.box is not None:
+        cells[2:6] = (f'{value:.4f}' for value in track.box.as_tuple())
+        cells[7] = '' if math.isnan(track.score) else f'{track.score:.4f}'
+        cells[8] = '' if track.depth is None else f'{track.depth:.4f}'
+    return ','.join(cells)
 
 
 class TrackCsvWriter:
@@ -31,10 +42,12 @@ class TrackCsvWriter:
         RecordingError: where it cannot be written.
     """
 
+    _header = ','.join(HEADER)
+
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = os.fspath(path)
         self._file: TextIO = sys.stdout if self.path == '-' else open_for_writing(Path(path))
-        self._write(','.join(HEADER))
+        self._write(self._header)
 
     def write_track(self, number: int, stamp_ns: int, track: Track) -> None:
         """Write the row of frame ``number``.
@@ -42,12 +55,7 @@ class TrackCsvWriter:
         Raises:
             RecordingError: where it cannot be written.
         """
-        cells = [str(number), str(stamp_ns), '', '', '', '', track.state.value, '', '']
-        if track.box is not None:
-            cells[2:6] = (f'{value:.4f}' for value in track.box.as_tuple())
-            cells[7] = '' if math.isnan(track.score) else f'{track.score:.4f}'
-            cells[8] = '' if track.depth is None else f'{track.depth:.4f}'
-        self._write(','.join(cells))
+        self._write(row(number, stamp_ns, track))
 
     def close(self) -> None:
         """Close the file."""
@@ -73,6 +81,21 @@ class TrackCsvWriter:
             raise
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
+
+
+class TracksCsvWriter(TrackCsvWriter):
+    """Writes the same of several targets: ``id`` comes first, and a row per frame and target."""
+
+    _header = ','.join(('id', *HEADER))
+
+    def write_tracks(self, number: int, stamp_ns: int, tracks: Mapping[int, Track]) -> None:
+        """Write the rows of frame ``number``, in the order of ids.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+        for who, track in sorted(tracks.items()):
+            self._write(f'{who},{row(number, stamp_ns, track)}')
 
 
 def open_for_writing(path: Path) -> TextIO:

@@ -10,6 +10,7 @@ import math
 import os
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -22,7 +23,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.overlay import draw_track
+from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
 from rgbd_kcf_tracker.recordings.results import cannot_write, prepare_output
 from rgbd_kcf_tracker.track import Track
 
@@ -60,14 +61,15 @@ class VideoWriter:
         self, frame: Frame, track: Track, truth: Box | None = None, caption: str = ''
     ) -> None:
         """Write a frame with the tracker's answer, and the truth as a thin line, drawn on it."""
-        # Words and lines want more pixels than a small picture has.
-        factor = max(1, math.ceil(_SMALLEST_WIDTH / frame.width))
-        image = frame.color
-        if factor > 1:
-            image = cast('npt.NDArray[np.uint8]', cv2.resize(image, None, fx=factor, fy=factor))
-            track = replace(track, box=_times(track.box, factor))
-            truth = _times(truth, factor)
-        self.write(draw_track(image, track, truth=truth, caption=caption))
+        image, factor = _enlarged(frame)
+        track = replace(track, box=_times(track.box, factor))
+        self.write(draw_track(image, track, truth=_times(truth, factor), caption=caption))
+
+    def write_tracks(self, frame: Frame, tracks: Mapping[int, Track], caption: str = '') -> None:
+        """Write a frame with the boxes of several targets drawn on it."""
+        image, factor = _enlarged(frame)
+        larger = {who: replace(t, box=_times(t.box, factor)) for who, t in tracks.items()}
+        self.write(draw_tracks(image, larger, caption=caption))
 
     def write(self, image: npt.NDArray[np.uint8]) -> None:
         """Write a ``(H, W, 3)`` uint8 BGR picture; one of another size is fitted into the first's.
@@ -158,6 +160,16 @@ class VideoWriter:
         self._log.seek(0)
         lines = self._log.read().decode('utf-8', 'replace').strip().splitlines()
         return f'{self.path} cannot be written: ffmpeg says {lines[-1] if lines else "nothing"!r}'
+
+
+def _enlarged(frame: Frame) -> tuple[npt.NDArray[np.uint8], int]:
+    """The picture, and by how much it is enlarged: words and lines want more than a small one."""
+    factor = max(1, math.ceil(_SMALLEST_WIDTH / frame.width))
+    if factor == 1:
+        return frame.color, 1
+    return cast(
+        'npt.NDArray[np.uint8]', cv2.resize(frame.color, None, fx=factor, fy=factor)
+    ), factor
 
 
 def _times(box: Box | None, factor: int) -> Box | None:

@@ -9,16 +9,24 @@ One module per format; :func:`open_dataset` finds out which it is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets import folder, otb, princeton, recorded, simulated, vot
+from rgbd_kcf_tracker.evaluation.datasets import (
+    everyone,
+    folder,
+    otb,
+    princeton,
+    recorded,
+    simulated,
+    vot,
+)
 from rgbd_kcf_tracker.evaluation.datasets.base import (
     Opened,
     Sample,
     Sequence,
     UnreadableError,
+    broken,
     entries,
 )
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
@@ -47,6 +55,7 @@ class DatasetOptions:
         duration_s: of simulated scenes, None for their own.
         size: of simulated images.
         names: leave out sequences whose name holds none of these texts; empty for none.
+        everyone: recordings in which everyone is followed, instead of one target each.
     """
 
     kind: str = 'auto'
@@ -57,6 +66,7 @@ class DatasetOptions:
     duration_s: float | None = None
     size: tuple[int, int] = (960, 540)
     names: tuple[str, ...] = ()
+    everyone: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -83,6 +93,7 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
             chosen.rate_hz or 30.0,
             chosen.duration_s,
             chosen.size,
+            chosen.everyone,
         )
     else:
         path = Path(text)
@@ -91,6 +102,11 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
                 f'{text} does not exist: give a folder, a bag, or simulated scenes as sim:all'
             )
         found = _walk(path, chosen, _DEPTH)
+        if not found and chosen.everyone:
+            raise DatasetError(
+                f'{text} holds no recording in which people have ids: expected images in rgb/ or '
+                'img1/ with mot.txt, gt/gt.txt (MOT Challenge) or groundtruth_PERSON.txt for each'
+            )
         if not found:
             raise DatasetError(
                 f'{text} holds no sequence: expected rgb/ with groundtruth.txt, img/ with '
@@ -113,23 +129,14 @@ def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
     except (OSError, UnreadableError) as error:
         if depth == _DEPTH:
             raise DatasetError(str(error)) from None
-        return [_broken(path, str(error))]
+        return [broken(path, str(error))]
     return [sequence for child in children for sequence in _walk(child, options, depth - 1)]
-
-
-def _broken(path: Path, reason: str) -> Sequence:
-    """A folder that cannot be read fails when it is run, and ends no other."""
-    return Sequence(
-        path.name, path.parent.name, 'broken', partial(_fail, reason), reason, path=path
-    )
-
-
-def _fail(reason: str) -> Opened:
-    raise DatasetError(reason)
 
 
 def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
     kind = options.kind
+    if options.everyone:
+        return everyone.find(path, options.fps) if everyone.is_sequence(path) else []
     read = ReadOptions(fps=options.fps)
     if recorded.is_sequence(path) and kind in ('auto', 'recording'):
         return [recorded.find(path, read)]

@@ -11,6 +11,7 @@ true of it.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -23,9 +24,31 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 CLEAR_FRACTION = 0.5
 """A target is clearly in view where at least this share of it shows."""
 
+EVERYONE = 'everyone'
+"""Kind of a sequence in which everyone is followed, instead of one target."""
+
 
 class UnreadableError(DatasetError):
     """A folder cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """Somebody in a frame.
+
+    Attributes:
+        id: who; -1 for a region in which nothing is judged.
+        box: of the visible part.
+        counts: False where they are neither hit nor miss, because too little of them shows.
+        body: box of the whole person where known (simulated scenes), else None.
+        share: visible share, 0 to 1, None where unknown.
+    """
+
+    id: int
+    box: Box
+    counts: bool = True
+    body: Box | None = None
+    share: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,12 +60,18 @@ class Sample:
         visible: box of the visible part, None where the target is absent.
         body: box of the whole target where known (simulated scenes), else None.
         fraction: how much of the target shows, 0 to 1, None where unknown.
+        judged: False where the truth leaves open what is right: the frame does not count.
+        people: everyone, of a sequence of kind :data:`EVERYONE`.
+        number: of the frame in the recording, from 0; of a sequence of that kind.
     """
 
     frame: Frame
     visible: Box | None
     body: Box | None = None
     fraction: float | None = None
+    judged: bool = True
+    people: tuple[Person, ...] = ()
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +105,7 @@ class Sequence:
     Attributes:
         name: unique within a run.
         scenario: the group it belongs to in tables.
-        kind: format it lies in: folder, otb, vot, princeton, sim or recording.
+        kind: format it lies in: folder, otb, vot, princeton, sim or recording; or everyone.
         open: opens it; made with :func:`functools.partial` so that it can be pickled.
         identity: changes whenever other frames or another truth would come out.
         categories: Princeton's splits, as far as known.
@@ -92,6 +121,17 @@ class Sequence:
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
     path: Path | None = None
+
+
+def broken(path: Path, reason: str) -> Sequence:
+    """A sequence that cannot be read: it fails when it is run, and ends no other."""
+    return Sequence(
+        path.name, path.parent.name, 'broken', functools.partial(_fail, reason), reason, path=path
+    )
+
+
+def _fail(reason: str) -> Opened:
+    raise DatasetError(reason)
 
 
 def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:

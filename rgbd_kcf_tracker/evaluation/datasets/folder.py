@@ -1,21 +1,39 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Our own folder layout: ``rgb/``, ``depth/``, one ground truth, or one per annotated person."""
+"""Our own folder layout: ``rgb/``, ``depth/``, and one ground truth, or one per annotated person.
+
+People are annotated in a file each, ``groundtruth_PERSON.txt``, or together in ``mot.txt``, as MOT
+Challenge text.
+"""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token, group, is_clear
+import numpy as np
+
+from rgbd_kcf_tracker.errors import DatasetError, RecordingError
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    Opened,
+    Sample,
+    Sequence,
+    broken,
+    file_token,
+    group,
+    is_clear,
+)
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
     check_lengths,
     even_stamps,
     image_files,
 )
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.mot import REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import (
     read_boxes,
     read_intrinsics,
@@ -27,6 +45,7 @@ TAIL_FRAMES = 15
 """Frames after a person was last seen that still count: the tracker must say that they are gone."""
 
 _BODY = 'groundtruth_body.txt'
+MOT_FILE = 'mot.txt'
 _PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', 'intrinsics.json')
 
 
@@ -36,8 +55,13 @@ def is_sequence(path: Path) -> bool:
 
 
 def find(path: Path, fps: float) -> list[Sequence]:
-    """The targets of a folder: one per ``groundtruth_PERSON.txt``, else groundtruth.txt's."""
-    people = sorted(p for p in path.glob('groundtruth_*.txt') if p.name != _BODY)
+    """The targets of a folder.
+
+    One per ``groundtruth_PERSON.txt``, else groundtruth.txt's, else one per id in ``mot.txt``.
+    """
+    people = people_files(path)
+    if not people and not (path / 'groundtruth.txt').is_file() and (path / MOT_FILE).is_file():
+        return _find_ids(path, fps)
     result = []
     for truth in people or [path / 'groundtruth.txt']:
         person = truth.stem.removeprefix('groundtruth').removeprefix('_')
@@ -62,6 +86,63 @@ def find(path: Path, fps: float) -> list[Sequence]:
             )
         )
     return result
+
+
+def people_files(path: Path) -> list[Path]:
+    """``groundtruth_PERSON.txt`` of each person, in the order of their names."""
+    return sorted(p for p in path.glob('groundtruth_*.txt') if p.name != _BODY)
+
+
+def _find_ids(path: Path, fps: float) -> list[Sequence]:
+    """A sequence per id in ``mot.txt`` that is clearly in view at some time."""
+    truth = path / MOT_FILE
+    try:
+        rows = read_mot(truth, regions=True)
+    except RecordingError as error:
+        return [broken(path, str(error))]
+    clear = (rows.scores > 0) & (rows.ids != REGION_ID)
+    files = (truth, path / 'rgb', path / 'depth', *(path / name for name in _PARTS[3:]))
+    return [
+        Sequence(
+            name=f'{path.name}/{who}',
+            scenario=path.name,
+            kind='folder',
+            open=partial(load_id, path, int(who), fps),
+            identity=f'folder:{file_token(*files)}:{who}:{fps}',
+            path=path,
+        )
+        for who in np.unique(rows.ids[clear])
+    ]
+
+
+def load_id(path: Path, who: int, fps: float) -> Opened:
+    """Open one person of ``mot.txt``, as :func:`load` does one of several.
+
+    A frame in which the person is barely visible (score 0) does not count.
+
+    Raises:
+        DatasetError: where the person is never clearly in view.
+        RecordingError: for a file that cannot be read or a line that is no sighting.
+    """
+    images = image_files(path / 'rgb')
+    rows = read_mot(path / MOT_FILE, len(images), regions=True)
+    rows = rows.only(rows.ids == who)
+    clear = rows.frames[rows.scores > 0]
+    if not len(clear):
+        raise DatasetError(f'{path / MOT_FILE}: id {who} is never clearly in view')
+    boxes: list[Box | None] = [None] * len(images)
+    judged = [True] * len(images)
+    for row, frame in enumerate(rows.frames):
+        boxes[frame] = rows.box(row)
+        judged[frame] = bool(rows.scores[row] > 0)
+    start, end = int(clear[0]), min(len(images), int(rows.frames[-1]) + TAIL_FRAMES + 1)
+    frames = read_frames(path, images, fps)
+
+    def samples() -> Iterator[Sample]:
+        for number, sample in enumerate(frames.samples(boxes, None, None, start, end), start):
+            yield dataclasses.replace(sample, judged=judged[number])
+
+    return Opened(samples(), length=end - start, start=start, total=len(images))
 
 
 def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: float) -> Opened:
@@ -97,7 +178,7 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         )
     start = clear[0]
     end = min(len(images), seen[-1] + TAIL_FRAMES + 1) if person else len(images)
-    frames = _frames(path, images, fps)
+    frames = read_frames(path, images, fps)
     return Opened(
         frames.samples(boxes, body, fractions, start, end),
         length=end - start,
@@ -129,7 +210,13 @@ def read_fractions(path: Path) -> list[float]:
     return result
 
 
-def _frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames:
+def read_frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames:
+    """The frames of a folder: its images with what lies beside them.
+
+    Raises:
+        DatasetError: where the depth image or the stamp of a frame is missing.
+        RecordingError: for a file that cannot be read.
+    """
     depths: tuple[Path | None, ...] = ()
     if (path / 'depth').is_dir():
         by_stem = {p.stem: p for p in image_files(path / 'depth')}

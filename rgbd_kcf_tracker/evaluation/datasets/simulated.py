@@ -10,7 +10,14 @@ from collections.abc import Sequence as Items
 from functools import partial
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    EVERYONE,
+    Opened,
+    Person,
+    Sample,
+    Sequence,
+)
+from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE
 from rgbd_kcf_tracker.simulation import SCENARIOS, expand_names, simulate
 
 PREFIX = 'sim:'
@@ -23,6 +30,7 @@ def find(
     rate_hz: float = 30.0,
     duration_s: float | None = None,
     size: tuple[int, int] = (960, 540),
+    everyone: bool = False,
 ) -> list[Sequence]:
     """The scenes that ``text`` names.
 
@@ -34,6 +42,7 @@ def find(
         rate_hz: frames per second.
         duration_s: length of each scene, None for its own.
         size: of the images, width and height in pixels.
+        everyone: in which everyone is followed, instead of the target.
 
     Raises:
         DatasetError: for an unknown scenario or a seed that is no number.
@@ -51,8 +60,10 @@ def find(
         Sequence(
             name=f'{name}/{seed}',
             scenario=name,
-            kind='sim',
-            open=partial(load, name, seed, rate_hz, duration_s, size),
+            kind=EVERYONE if everyone else 'sim',
+            open=partial(
+                load_everyone if everyone else load, name, seed, rate_hz, duration_s, size
+            ),
             identity=f'sim:{name}:{seed}:{rate_hz}:{duration_s}:{size}',
         )
         for name in chosen
@@ -88,5 +99,35 @@ def load(
     def samples() -> Iterator[Sample]:
         for moment in scene:
             yield Sample(moment.frame, moment.visible, moment.body, moment.visible_fraction)
+
+    return Opened(samples(), len(scene), has_body=True)
+
+
+def load_everyone(
+    scenario: str, seed: int, rate_hz: float, duration_s: float | None, size: tuple[int, int]
+) -> Opened:
+    """Render one scene with the truth about everyone in it.
+
+    Raises:
+        DatasetError: where the scene tells of its target alone.
+    """
+    scene = simulate(scenario, seed=seed, rate_hz=rate_hz, duration_s=duration_s, size=size)
+    if len(scene.people) < 2:
+        raise DatasetError(
+            f'the scenario {scenario} tells where its target is, and of nobody else: '
+            'choose one of several people'
+        )
+
+    def samples() -> Iterator[Sample]:
+        for number, moment in enumerate(scene):
+            people = tuple(
+                Person(
+                    who, truth.shown, truth.visible_fraction >= BARELY_VISIBLE, truth.body,
+                    truth.visible_fraction,
+                )
+                for who, truth in moment.truths.items()
+                if truth.shown is not None
+            )  # fmt: skip
+            yield Sample(moment.frame, None, people=people, number=number)
 
     return Opened(samples(), len(scene), has_body=True)

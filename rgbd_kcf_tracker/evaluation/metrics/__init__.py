@@ -4,8 +4,9 @@
 """Every measure as a pure function: arrays or boxes in, numbers out.
 
 :func:`measure_boxes` gives all of a sequence's numbers at once; the modules hold the parts, one
-idea each: ``boxes`` (overlap, centre error), ``princeton``, ``otb``, ``confusion``, ``vot``
-(short-term), ``longterm``, ``calibration``.
+idea each: ``boxes`` (overlap, centre error), ``princeton``, ``otb``, ``confusion``,
+``presence`` (strangers, returns), ``vot`` (short-term), ``longterm``, ``calibration``; and
+``everyone`` for several people at once.
 """
 
 from rgbd_kcf_tracker.evaluation.metrics.comparison import Comparison, compare

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics import confusion, otb, princeton
+from rgbd_kcf_tracker.evaluation.metrics import confusion, otb, presence, princeton
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Boxes, Mask
 from rgbd_kcf_tracker.evaluation.metrics.comparison import Comparison, compare
 
@@ -34,6 +34,8 @@ class Measures:
         success_auc: mean of Princeton's R over its 21 thresholds.
         iou: mean IoU over the frames in which the target shows, 0 where there is no box.
         recall_of_absence: of the frames in which the target is absent, the share without a box.
+        strangers: of all frames, the share with a box on something else.
+        returns: of the times the target came back, the share in which it was found.
         tp, fp, tn, fn: the thesis's confusion matrix by method 2.
         precision: TP / (TP + FP), the thesis's 'precision' and part of its average precision.
         precision_20px: of the frames in which the target shows, the share with a box whose centre
@@ -47,6 +49,8 @@ class Measures:
     success_auc: float
     iou: float
     recall_of_absence: float
+    strangers: float
+    returns: float
     tp: float
     fp: float
     tn: float
@@ -73,6 +77,8 @@ def measure(comparison: Comparison) -> Measures:
         success_auc=float(np.mean(princeton.success_curve(ratios))),
         iou=_mean(np.nan_to_num(c.overlap[c.there])),
         recall_of_absence=_mean(~c.said[~c.there]),
+        strangers=presence.strangers(c.overlap, c.said, c.there),
+        returns=presence.returns(c.overlap, c.said, c.there),
         tp=_or_nan(matrix.tp),
         fp=_or_nan(matrix.fp),
         tn=_or_nan(matrix.tn),

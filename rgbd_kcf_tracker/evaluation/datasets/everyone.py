@@ -1,0 +1,176 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings with the truth about everyone in view: ids, boxes, and how much of each shows.
+
+The truth lies beside the images as MOT Challenge text (``mot.txt``, or ``gt/gt.txt`` as the
+challenge has it), or as one ``groundtruth_PERSON.txt`` for each, with ``visible_PERSON.txt``. With
+either, ``body_PERSON.txt`` has the whole body, where it is known (simulated scenes).
+"""
+
+from __future__ import annotations
+
+import configparser
+import dataclasses
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.evaluation.datasets.base import (
+    EVERYONE,
+    Opened,
+    Person,
+    Sample,
+    Sequence,
+    file_token,
+    group,
+)
+from rgbd_kcf_tracker.evaluation.datasets.folder import (
+    MOT_FILE,
+    people_files,
+    read_fractions,
+    read_frames,
+)
+from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, image_files
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, read_mot
+from rgbd_kcf_tracker.recordings.textfiles import read_boxes
+
+IMAGE_FOLDERS = ('rgb', 'color', 'img1', 'img')
+_CHALLENGE = Path('gt') / 'gt.txt'
+_INFO = 'seqinfo.ini'
+
+People = dict[int, list[Person]]
+"""Who is in each frame that has anybody, by index from 0."""
+
+
+def is_sequence(path: Path) -> bool:
+    """Whether a folder holds images and the truth about several people."""
+    return _image_folder(path) is not None and bool(_truth_files(path))
+
+
+def find(path: Path, fps: float) -> list[Sequence]:
+    """The one recording of a folder."""
+    files = [*_truth_files(path), *sorted(path.glob('visible_*.txt'))]
+    files += sorted(path.glob('body_*.txt'))
+    parts = [path / n for n in (*IMAGE_FOLDERS, 'depth', 'timestamps.txt', 'intrinsics.json')]
+    return [
+        Sequence(
+            name=path.name,
+            scenario=group(path),
+            kind=EVERYONE,
+            open=partial(load, path, fps),
+            identity=f'everyone:{file_token(*files, *parts, path / _INFO)}:{fps}',
+            path=path,
+        )
+    ]
+
+
+def load(path: Path, fps: float) -> Opened:
+    """Open a recording with everyone in it.
+
+    Raises:
+        DatasetError: where nobody is in it, or lines and images differ in number.
+        RecordingError: for a file that cannot be read, or a line that is not as it should be.
+    """
+    folder = _image_folder(path)
+    if folder is None:
+        raise DatasetError(f'{path} holds no images in {", ".join(IMAGE_FOLDERS)}')
+    images = image_files(folder)
+    truth = _truth_files(path)
+    together = truth[0].name in (MOT_FILE, _CHALLENGE.name)
+    if together:
+        people = _from_mot(truth[0], path, images, folder)
+    else:
+        people = _from_files(truth, images, folder)
+    if not people:
+        raise DatasetError(f'{truth[0]}: nobody is ever in view: nothing to measure against')
+    frames = read_frames(path, images, _challenge_rate(path) or fps)
+
+    def samples() -> Iterator[Sample]:
+        nobody = [None] * len(images)
+        for number, sample in enumerate(frames.samples(nobody)):
+            present = tuple(people.get(number, ()))
+            yield dataclasses.replace(sample, people=present, number=number)
+
+    known = any(p.body is not None for present in people.values() for p in present)
+    return Opened(samples(), len(images), total=len(images), has_body=known)
+
+
+def _from_mot(path: Path, beside: Path, images: tuple[Path, ...], folder: Path) -> People:
+    rows = read_mot(path, len(images), regions=True)
+    bodies = {
+        int(who): _bodies(beside / f'body_{who}.txt', images, folder) for who in set(rows.ids)
+    }
+    people: People = defaultdict(list)
+    for row, (frame, who, score, share) in enumerate(
+        zip(rows.frames, rows.ids, rows.scores, rows.shares, strict=True)
+    ):
+        shown = None if share != share else float(share)
+        body = bodies[int(who)][frame]
+        person = Person(int(who), rows.box(row), bool(score > 0), body, shown)
+        people[int(frame)].append(person)
+    return people
+
+
+def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> People:
+    """A file for each person; ids are their names if all are numbers, else counted from 1."""
+    people: People = defaultdict(list)
+    names = [path.stem.removeprefix('groundtruth_') for path in paths]
+    numbers = all(name.isascii() and name.isdigit() for name in names)
+    for count, (name, path) in enumerate(zip(names, paths, strict=True), start=1):
+        who = int(name) if numbers else count
+        bodies = _bodies(path.with_name(f'body_{name}.txt'), images, folder)
+        boxes = read_boxes(path)
+        check_lengths(path, len(boxes), images, folder)
+        shares: list[float] | None = None
+        if _share_file(path).is_file():
+            shares = read_fractions(_share_file(path))
+            check_lengths(_share_file(path), len(shares), images, folder)
+        for frame, box in enumerate(boxes):
+            if box is not None:
+                share = None if shares is None else shares[frame]
+                counts = share is None or share >= BARELY_VISIBLE
+                people[frame].append(Person(who, box, counts, bodies[frame], share))
+    return people
+
+
+def _bodies(path: Path, images: tuple[Path, ...], folder: Path) -> list[Box | None]:
+    """The whole body in each frame; None where it is not known."""
+    if not path.is_file():
+        return [None] * len(images)
+    boxes = read_boxes(path)
+    check_lengths(path, len(boxes), images, folder)
+    return boxes
+
+
+def _image_folder(path: Path) -> Path | None:
+    return next((path / name for name in IMAGE_FOLDERS if (path / name).is_dir()), None)
+
+
+def _truth_files(path: Path) -> list[Path]:
+    for name in (path / MOT_FILE, path / _CHALLENGE):
+        if name.is_file():
+            return [name]
+    return people_files(path)
+
+
+def _share_file(path: Path) -> Path:
+    return path.with_name(path.name.replace('groundtruth', 'visible', 1))
+
+
+def _challenge_rate(path: Path) -> float | None:
+    """Frames per second as the challenge's ``seqinfo.ini`` states them."""
+    if not (path / _INFO).is_file():
+        return None
+    info = configparser.ConfigParser(interpolation=None)
+    try:
+        info.read(path / _INFO, encoding='utf-8')
+        rate = info.getfloat('Sequence', 'frameRate')
+    except (OSError, ValueError, configparser.Error) as error:
+        raise DatasetError(f'{path / _INFO}: no frameRate in [Sequence] ({error})') from None
+    if not 0 < rate < 1e6:
+        raise DatasetError(f'{path / _INFO}: frameRate is {rate:g}: give frames per second')
+    return rate
