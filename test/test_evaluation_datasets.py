@@ -428,6 +428,7 @@ def test_a_scene_measures_the_same_as_bag_and_as_folder(tmp_path: Path):
     options = DatasetOptions(duration_s=0.5, size=(160, 90))
     (scene,) = open_dataset('sim:normal:4', options)
     bag, folder = tmp_path / 'normal_4.mcap', tmp_path / 'folders' / 'normal_4'
+    folder.parent.mkdir()
     with BagWriter(bag) as writer, SequenceWriter(folder) as images:
         for s in scene.open().samples:
             writer.write_frame(s.frame)

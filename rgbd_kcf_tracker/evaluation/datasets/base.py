@@ -11,6 +11,7 @@ true of it.
 from __future__ import annotations
 
 import dataclasses
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -92,6 +93,12 @@ class Sequence:
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
     path: Path | None = None
+
+    def __post_init__(self) -> None:
+        # Names of files need not be UTF-8, those in tables do.
+        for field_name in ('name', 'scenario'):
+            text = os.fsencode(getattr(self, field_name)).decode('utf-8', 'backslashreplace')
+            object.__setattr__(self, field_name, text)
 
 
 def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:
