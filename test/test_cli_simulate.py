@@ -24,7 +24,7 @@ def run(*words: object) -> int:
 
 @pytest.mark.parametrize('name', ['walk.mcap', 'walk'])
 def test_what_is_written_is_what_was_simulated(tmp_path: Path, name: str) -> None:
-    dest = tmp_path / 'made' / name
+    dest = tmp_path / name
     assert run(dest, '--scenario', 'behind_box', '--seed', 3, *SMALL) == 0
     expected = list(simulate('behind_box', 3, 2.0, size=(160, 90)))
     with open_recording(dest, ReadOptions()) as recording:

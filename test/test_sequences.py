@@ -50,8 +50,11 @@ def test_what_is_written_comes_back(tmp_path: Path) -> None:
 def test_a_written_folder_is_not_overwritten(tmp_path: Path) -> None:
     with SequenceWriter(tmp_path) as writer:
         writer.write(FRAMES[0])
-    with pytest.raises(RecordingError, match='holds a sequence already'):
+    with pytest.raises(RecordingError, match='is there already'):
         SequenceWriter(tmp_path)
+    (tmp_path / 'thesis.txt').write_text('years of work')
+    with pytest.raises(RecordingError, match=r'holds thesis\.txt, which we did not write'):
+        SequenceWriter(tmp_path, overwrite=True)
     with pytest.raises(ParameterError, match='png or jpg'):
         SequenceWriter(tmp_path / 'b', 'gif')
 

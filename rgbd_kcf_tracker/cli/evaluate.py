@@ -13,8 +13,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics
+from rgbd_kcf_tracker.cli.common import (
+    add_overwrite_option,
+    counter,
+    parse_assignments,
+    parse_intrinsics,
+)
+from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.extras import require
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -45,7 +52,8 @@ examples:
       --report report/
   rgbd-kcf evaluate sim:all --variants metric --ablate --report report/
 
-Run again with the same --report to go on after an interruption, or to add trackers.
+Ctrl-C finishes the runs under way and reports what there is; pressed again it stops at once. Run
+again with the same --report to go on, or to add trackers.
 """
 
 
@@ -126,10 +134,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--export', action='append', default=[], choices=('princeton', 'vot'),
         help='also write results as this benchmark takes them',
     )  # fmt: skip
+    add_overwrite_option(group, 'files in a DIR that holds other things than a report')
 
 
 def run(args: argparse.Namespace) -> int:
     """Run everything that is not done yet, then write the report; returns the exit code."""
+    require('report', NAME)
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.jobs import RunOptions
@@ -137,6 +147,7 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.report import PAGE, Heading, write_report
     from rgbd_kcf_tracker.evaluation.tables import overview
 
+    _check_report(args)
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
@@ -151,8 +162,7 @@ def run(args: argparse.Namespace) -> int:
         fresh=args.fresh,
         intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
     )
-    _check_writable(args.report)
-
+    _make_report_folder(args.report)
     failures = _run(sequences, contenders, args.report, options)
     collected = collect(args.report, sequences, contenders, options)
     for form in args.export:
@@ -161,34 +171,25 @@ def run(args: argparse.Namespace) -> int:
     heading = Heading(tuple(args.dataset), _in_words(args), words, tuple(ablated), eao_lengths)
     if not collected.results and collected.unmeasured:
         print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
-    else:
+    elif collected.results or not interrupts.asked:
         measured = write_report(args.report, collected, contenders, failures, heading)
         print(overview(measured).text())
         print(f'\nreport: {args.report / PAGE}')
     _list_failures(failures)
+    if interrupts.asked:
+        print('stopped; the same command goes on from here', file=sys.stderr)
+        return EXIT_INTERRUPTED
     return EXIT_FAILURES if failures else 0
 
 
 def _run(
     sequences: list[Benchmark], contenders: list[Contender], folder: Path, options: RunOptions
 ) -> list[Failure]:
-    from tqdm import tqdm
-
     from rgbd_kcf_tracker.evaluation.runner import run as run_all
 
-    total = len(sequences) * len(contenders)
-    with tqdm(total=total, unit='run', disable=None, leave=False, smoothing=0.05) as bar:
-
-        def report(done: int, name: str) -> None:
-            bar.set_postfix_str(name, refresh=False)
-            bar.update(done)
-
-        try:
-            return run_all(sequences, contenders, folder, options, report)
-        except KeyboardInterrupt:
-            bar.close()
-            print('stopped; the same command goes on from here', file=sys.stderr)
-            raise
+    notice = 'the runs under way are finished, then it stops; Ctrl-C again stops at once'
+    with counter(len(sequences) * len(contenders), 'run') as report, interrupts.held(notice):
+        return run_all(sequences, contenders, folder, options, report, lambda: interrupts.asked)
 
 
 def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
@@ -314,14 +315,35 @@ def _list_failures(failures: Sequence[Failure]) -> None:
         print(f'  {failure.sequence}{tracker}: {last}', file=sys.stderr)
 
 
-def _check_writable(folder: Path) -> None:
+def _check_report(args: argparse.Namespace) -> None:
+    """Refuse a folder that lies in the data, or holds other things than a report."""
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
+    from rgbd_kcf_tracker.evaluation.report import REPORT_NAMES
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+
+    sources = [text for text in args.dataset if not text.startswith(PREFIX)]
+    check_outputs({'--report': args.report}, sources, overwrite=True, folders=('--report',))
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        held = set(os.listdir(args.report)) if args.report.exists() else set()
+    except OSError as error:
+        raise RecordingError(f'{args.report} cannot be read: {error.strerror or error}') from None
+    if 'results' not in held and held - REPORT_NAMES and not args.overwrite:
+        raise RecordingError(
+            f'{args.report} is there already, and is no report: give another name, or add '
+            '--overwrite to write into it'
+        )
+
+
+def _make_report_folder(folder: Path) -> None:
+    from rgbd_kcf_tracker.recordings.outputs import cannot_write, make_folder
+
+    make_folder(folder)
+    try:
         probe = folder / '.write'
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise RecordingError(f'{folder} cannot be written: {error.strerror or error}') from None
+        raise RecordingError(cannot_write(folder, error)) from None
 
 
 def _words(text: str) -> list[str]:

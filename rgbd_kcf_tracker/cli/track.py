@@ -10,12 +10,12 @@ import sys
 import time
 from collections import Counter
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rgbd_kcf_tracker.cli.common import (
     SOURCE_HELP,
     Warnings,
+    add_overwrite_option,
     add_reading_options,
     parse_assignments,
     parse_box,
@@ -65,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         '--bag', metavar='FILE.mcap', help="the frames with the tracker's topics beside them"
     )
+    add_overwrite_option(output, 'files that are there')
     add_reading_options(parser)
 
 
@@ -73,9 +74,9 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.recordings import open_recording
     from rgbd_kcf_tracker.track import require_inside
 
+    _check_outputs(args)
     tracker, variant = _make_tracker(args)
     given = None if args.init is None else parse_box(args.init)
-    _check_outputs(args)
     with open_recording(args.source, read_options(args)) as recording:
         start, end = _frame_range(args, recording)
         warnings = Warnings(recording.warnings)
@@ -138,16 +139,22 @@ class _Sinks:
         self.truth = recording.groundtruth
         self.body = recording.groundtruth_body
         self.written = [p for p in (args.output, args.video, args.bag) if p and p != '-']
-        self.csv = stack.enter_context(TrackCsvWriter(args.output)) if args.output else None
-        self.video = None
+        self.csv = self.video = self.bag = None
+        if args.output:
+            self.csv = stack.enter_context(TrackCsvWriter(args.output, args.overwrite))
         if args.video:
             rate = recording.info().rate_hz or args.fps
-            self.video = stack.enter_context(VideoWriter(args.video, rate))
-        self.bag = None
+            self.video = stack.enter_context(VideoWriter(args.video, rate, args.overwrite))
         if args.bag:
             topics, depth_encoding = output_topics(recording)
             self.bag = stack.enter_context(
-                BagWriter(args.bag, topics, depth_encoding=depth_encoding, annotate=True)
+                BagWriter(
+                    args.bag,
+                    topics,
+                    depth_encoding=depth_encoding,
+                    annotate=True,
+                    overwrite=args.overwrite,
+                )
             )
 
     def write(self, number: int, frame: Frame, track: Track) -> None:
@@ -176,12 +183,17 @@ def _make_tracker(args: argparse.Namespace) -> tuple[Tracker, str]:
 
 
 def _check_outputs(args: argparse.Namespace) -> None:
-    """Refuse an output that would overwrite the source, before anything is opened."""
-    source = Path(args.source).resolve()
-    for name in ('output', 'video', 'bag'):
-        value = getattr(args, name)
-        if value and value != '-' and Path(value).resolve() == source:
-            raise RecordingError(f'--{name} {value} is the source itself: give another name')
+    """Refuse outputs that cannot be written, or must not, before anything is done."""
+    from rgbd_kcf_tracker.recordings.files import require_source
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+    from rgbd_kcf_tracker.recordings.video import require_video
+
+    require_source(args.source)
+    outputs = {f'--{name}': getattr(args, name) for name in ('output', 'video', 'bag')}
+    written = {option: path for option, path in outputs.items() if path and path != '-'}
+    check_outputs(written, [args.source], args.overwrite)
+    if args.video:
+        require_video(args.video)
 
 
 def _frame_range(args: argparse.Namespace, recording: Recording) -> tuple[int, int]:

@@ -48,7 +48,8 @@ def draw_track(
     out = np.array(image, order='C')
     color = STATE_COLORS[track.state]
     scale = max(0.42, min(out.shape[0] / 900, out.shape[1] / 1100))
-    thickness = max(1, round(3.2 * scale))
+    # Video keeps one colour for two by two pixels: a thinner line has none of its own there.
+    thickness = max(3, round(3.2 * scale))
     if truth is not None:
         _rectangle(out, truth, (0, 0, 0), 3)
         _rectangle(out, truth, TRUTH_COLOR, 1)

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-from pathlib import Path
+from io import FileIO
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any
 
 import cv2
 import numpy.typing as npt
@@ -18,37 +19,54 @@ from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.encoding import millimetres
-from rgbd_kcf_tracker.recordings.results import cannot_write, open_for_writing
+from rgbd_kcf_tracker.recordings.outputs import OutputFolder, cannot_write
 from rgbd_kcf_tracker.recordings.textfiles import format_box
+
+# At the end of the name of an image that is being written.
+_PART = '.part'
+_FILES = (
+    'rgb',
+    'depth',
+    'intrinsics.json',
+    'timestamps.txt',
+    'groundtruth.txt',
+    'groundtruth_body.txt',
+    'visible.txt',
+)
 
 
 class SequenceWriter:
     """Writes ``rgb/``, ``depth/`` (16-bit PNG, millimetres) and the text files beside them.
 
-    Lines are written with their images, so an interrupted run leaves a sequence that can be read.
+    Lines are written with their images, so a run that is interrupted or killed leaves a sequence
+    that can be read; one that was to replace another leaves it beside that.
 
     Args:
-        folder: is made; it may be there, but must not hold images yet.
+        folder: is made; it may be there, but must be empty.
         color_format: 'png', or 'jpg' where size matters more than the last bit.
+        overwrite: replace a sequence that is there.
+
+    Attributes:
+        output: the folder.
 
     Raises:
-        RecordingError: where it cannot be written, or holds images already.
+        RecordingError: where it cannot be written, or holds something already.
         ParameterError: for another format.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], color_format: str = 'png') -> None:
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        color_format: str = 'png',
+        overwrite: bool = False,
+    ) -> None:
         if color_format not in ('png', 'jpg'):
             raise ParameterError(f'colour format is {color_format!r}: choose png or jpg')
-        self.folder = Path(folder)
+        self.output = OutputFolder(folder, _FILES, overwrite)
         self._suffix = color_format
-        self._files: dict[str, TextIO] = {}
+        self._files: dict[str, FileIO] = {}
         self._count = 0
-        try:
-            (self.folder / 'rgb').mkdir(parents=True, exist_ok=True)
-            if any((self.folder / 'rgb').iterdir()):
-                raise RecordingError(f'{self.folder} holds a sequence already: give another folder')
-        except OSError as error:
-            raise RecordingError(cannot_write(self.folder, error)) from None
+        self._make('rgb')
 
     def write(
         self,
@@ -68,28 +86,46 @@ class SequenceWriter:
         Raises:
             RecordingError: where it cannot be written.
         """
+        name = f'{self._count + 1:06d}'
+        sizes = {key: file.tell() for key, file in self._files.items()}
+        images = [f'rgb/{name}.{self._suffix}']
+        try:
+            self._write_image(images[0], frame.color)
+            if frame.depth is not None:
+                self._make('depth')
+                images.append(f'depth/{name}.png')
+                self._write_image(images[1], millimetres(frame.depth))
+            if self._count == 0 and frame.intrinsics is not None:
+                camera = frame.intrinsics
+                values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
+                self._write_line('intrinsics.json', json.dumps(values, indent=2))
+            self._write_line('groundtruth.txt', format_box(visible))
+            self._write_line('groundtruth_body.txt', format_box(body))
+            if visible_fraction is not None:
+                self._write_line('visible.txt', f'{visible_fraction:.4f}')
+            # Last what makes it a frame, so that a kill leaves all of it or none.
+            self._write_line('timestamps.txt', str(frame.stamp_ns))
+            for image in images:
+                self._show(image)
+        except BaseException:
+            self._take_back(images, sizes)
+            raise
         self._count += 1
-        name = f'{self._count:06d}'
-        self._write_image(self.folder / 'rgb' / f'{name}.{self._suffix}', frame.color)
-        if frame.depth is not None:
-            if not (self.folder / 'depth').exists():
-                (self.folder / 'depth').mkdir()
-            self._write_image(self.folder / 'depth' / f'{name}.png', millimetres(frame.depth))
-        if self._count == 1 and frame.intrinsics is not None:
-            camera = frame.intrinsics
-            values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
-            with open_for_writing(self.folder / 'intrinsics.json') as file:
-                file.write(json.dumps(values, indent=2) + '\n')
-        self._write_line('timestamps.txt', str(frame.stamp_ns))
-        self._write_line('groundtruth.txt', format_box(visible))
-        self._write_line('groundtruth_body.txt', format_box(body))
-        if visible_fraction is not None:
-            self._write_line('visible.txt', f'{visible_fraction:.4f}')
 
-    def close(self) -> None:
-        """Close the files."""
-        for file in self._files.values():
-            file.close()
+    def close(self, whole: bool = True) -> None:
+        """Close the files; a folder without a frame is removed.
+
+        Args:
+            whole: all frames are written: only then does it replace another.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+        files, self._files = self._files, {}
+        for file in files.values():
+            with contextlib.suppress(OSError):  # a full disk was told when it was written
+                file.close()
+        self.output.end(whole=whole, anything=self._count > 0)
 
     def __enter__(self) -> SequenceWriter:
         return self
@@ -100,27 +136,57 @@ class SequenceWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        if error is None:
+            self.close()
+        else:
+            with contextlib.suppress(RecordingError):  # the error before says more
+                self.close(whole=False)
+
+    def _show(self, name: str) -> None:
+        try:
+            path = self.output.place / name
+            path.with_name(path.name + _PART).rename(path)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
+
+    def _take_back(self, images: list[str], sizes: dict[str, int]) -> None:
+        """Leave no half of a frame."""
+        for image in images:
+            for end in ('', _PART):
+                with contextlib.suppress(OSError):
+                    (self.output.place / f'{image}{end}').unlink()
+        for key, file in self._files.items():
+            with contextlib.suppress(OSError):
+                file.truncate(sizes.get(key, 0))
+
+    def _make(self, name: str) -> None:
+        try:
+            (self.output.place / name).mkdir(exist_ok=True)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
 
     def _write_line(self, name: str, line: str) -> None:
-        if name not in self._files:
-            self._files[name] = open_for_writing(self.folder / name)
         try:
-            self._files[name].write(line + '\n')
-            self._files[name].flush()
+            if name not in self._files:
+                self._files[name] = (self.output.place / name).open('xb', buffering=0)
+            data = line.encode() + b'\n'
+            while data:  # a disk that gets full takes a part
+                data = data[self._files[name].write(data) :]
         except OSError as error:
-            raise RecordingError(cannot_write(self.folder / name, error)) from None
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
 
-    def _write_image(self, path: Path, image: npt.NDArray[Any]) -> None:
+    def _write_image(self, name: str, image: npt.NDArray[Any]) -> None:
+        suffix = name[-4:]
         flags = (
             [int(cv2.IMWRITE_PNG_COMPRESSION), 1]
-            if path.suffix == '.png'
+            if suffix == '.png'
             else [int(cv2.IMWRITE_JPEG_QUALITY), 95]
         )
-        done, data = cv2.imencode(path.suffix, image, flags)
+        done, data = cv2.imencode(suffix, image, flags)
         try:
             if not done:
                 raise OSError('image cannot be encoded')
-            path.write_bytes(data.tobytes())
+            with (self.output.place / f'{name}{_PART}').open('xb') as file:
+                file.write(data.tobytes())
         except OSError as error:
-            raise RecordingError(cannot_write(path, error)) from None
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
