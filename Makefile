@@ -7,13 +7,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Arguments for pytest, as in: make test PYTEST="-k replay"
 PYTEST ?=
+# Arguments for the injector, as in: make inject INJECT="--count 5000 --seed 7"
+INJECT ?= --count 1000
 
 # A shell in which another ROS 2 or virtual environment is active must not leak into this one.
 unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_PATH
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE VIRTUAL_ENV
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint types format matrix clean distclean
+.PHONY: help demo test inject lint types format matrix clean distclean
 
 help: ## say what can be made
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -23,6 +25,9 @@ demo: $(VENV)/.installed ## simulate a recording, run both nodes over it, show t
 
 test: $(VENV)/.installed-test ## run the whole suite
 	$(BIN)/python -m pytest $(PYTEST)
+
+inject: $(VENV)/.installed ## try faults of files, disks and signals on every command
+	$(BIN)/python -m rgbd_kcf_tracker.bench.inject $(INJECT)
 
 lint: $(VENV)/.installed-lint ## check style
 	$(BIN)/ruff check .
@@ -57,7 +62,7 @@ $(BIN)/python:
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt
 $(VENV)/.installed: setup.py setup.cfg pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV) ..."
-	$(INSTALL) --editable '.[ros]'
+	$(INSTALL) --editable '.[ros,tools]'
 	@touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed

@@ -28,12 +28,15 @@ ROS = [
     'ros-lifecycle-msgs==2.0.3',
     'ros-rosgraph-msgs==2.0.3',
 ]
+# What a robot does without; extras.py tells which command needs which.
+REPORT = ['matplotlib>=3.7', 'jinja2']
+VIDEO = ['imageio-ffmpeg']
+TOOLS = [*REPORT, *VIDEO, 'tqdm', 'psutil']
 TEST = [
     'pytest>=8',
     'pytest-timeout',
     'pytest-xdist',
     'hypothesis',
-    'psutil',
     'colcon-common-extensions',
     'setuptools>=70.1,<80',  # builds wheels by itself; colcon refuses later ones
 ]
@@ -100,12 +103,15 @@ setup(
         'lz4',
         'zstandard',
         'PyYAML',
-        'tqdm',
-        'matplotlib>=3.7',
-        'jinja2',
-        'imageio-ffmpeg',
     ],
-    extras_require={'ros': ROS, 'test': TEST, 'lint': LINT},
+    extras_require={
+        'report': REPORT,
+        'video': VIDEO,
+        'tools': TOOLS,
+        'ros': ROS,
+        'test': [*TOOLS, *TEST],
+        'lint': LINT,
+    },
     zip_safe=False,
     entry_points={
         'console_scripts': [

@@ -30,3 +30,7 @@ class RecordingError(RgbdKcfError):
 
 class DatasetError(RgbdKcfError):
     """A data set or a file of results does not have the form it should."""
+
+
+class MissingExtraError(RgbdKcfError):
+    """A library that only some commands need is not installed."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap.writer import Writer
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
@@ -98,7 +99,13 @@ def camera_messages(
 
 def write_mcap(path: Path, sent: list[Sent], compression: str = 'none') -> Path:
     """A single mcap file."""
-    with McapWriter(path, compression) as writer:
+    if not sent:  # ours leaves no empty file
+        with path.open('wb') as file:
+            empty = Writer(file)
+            empty.start(profile='ros2')
+            empty.finish()
+        return path
+    with McapWriter(path, compression, overwrite=True) as writer:
         for s in sent:
             writer.write(s.topic, s.message, s.log_ns)
     return path

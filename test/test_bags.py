@@ -720,6 +720,6 @@ def test_the_real_ros_1_bags_open(shared_data: Path, tmp_path: Path) -> None:
         assert frame.intrinsics is not None
         assert frame.intrinsics.fx == pytest.approx(537.03, abs=0.01)
         bag = RawBag(path)
-        assert copy_bag(bag, tmp_path / 'a.mcap') == (3, [])
+        assert copy_bag(bag, tmp_path / f'{path.stem}.mcap') == (3, [])
         bag.close()
-        assert_same_frames(read(tmp_path / 'a.mcap')[0], [frame])
+        assert_same_frames(read(tmp_path / f'{path.stem}.mcap')[0], [frame])

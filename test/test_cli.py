@@ -85,7 +85,7 @@ def fails(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 def test_track_writes_csv_video_and_bag(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = {name: tmp_path / 'new' / f'out.{name}' for name in ('csv', 'mp4', 'mcap')}
+    out = {name: tmp_path / f'out.{name}' for name in ('csv', 'mp4', 'mcap')}
     arguments = ['track', str(folder), '--variant', 'kcf', '--output', str(out['csv'])]
     code = main([*arguments, '--video', str(out['mp4']), '--bag', str(out['mcap'])])
     assert code == 0
@@ -146,6 +146,15 @@ def test_part_of_the_frames_from_a_given_box(folder: Path, tmp_path: Path) -> No
     assert [float(found[0][k]) for k in ('x', 'y', 'width', 'height')] == [39, 40, 40, 40]
 
 
+def test_a_box_that_begins_left_of_the_image(folder: Path, tmp_path: Path) -> None:
+    """A number with a minus is no option, however it is given."""
+    for number, init in enumerate((['--init', '-10,40,60,40'], ['--init=-10,40,60,40'])):
+        output = tmp_path / f'{number}.csv'
+        words = ['track', str(folder), *init, '--intrinsics', '525,525,-3,.5', '--end', '3']
+        assert main([*words, '--variant', 'kcf', '--output', str(output)]) == 0
+        assert rows(output)[0]['x'] == '-10.0000'
+
+
 def test_rows_before_the_first_box_are_idle(tmp_path: Path) -> None:
     source = write_folder(tmp_path / 'a')
     text = (source / 'groundtruth.txt').read_text().splitlines()
@@ -201,7 +210,10 @@ def test_bad_values_say_what_to_write(
     assert 'has no size' in fails(capsys, *track, '--init', '10,10,0,5')
     assert 'has no size' in fails(capsys, *track, '--init', '10,10,-4,5')
     assert 'finite' in fails(capsys, *track, '--init', 'nan,10,4,5')
-    assert '160x120' in fails(capsys, *track, '--init', '500,10,20,20')
+    assert 'lies outside the 160x120' in fails(capsys, *track, '--init', '500,10,20,20')
+    assert 'lies outside' in fails(capsys, *track, '--init', '-50,10,20,20')
+    assert 'reaches too far' in fails(capsys, *track, '--init', '10,10,4294967246,20')
+    assert 'reaches too far' in fails(capsys, *track, '--init', '-1e9,-1e9,2e9,2e9')
     assert 'FX,FY,CX,CY' in fails(capsys, *track, '--intrinsics', '5,5')
     assert 'focal' in fails(capsys, *track, '--intrinsics', '0,5,5,5')
     assert 'choose one of' in fails(capsys, *track, '--variant', 'magic')
@@ -211,7 +223,8 @@ def test_bad_values_say_what_to_write(
     assert 'key=value' in fails(capsys, *track, '--param', 'padding')
     assert 'frames 0 to 11' in fails(capsys, *track, '--start', '12')
     assert 'above --start 5' in fails(capsys, *track, '--start', '5', '--end', '5')
-    assert 'fps' in fails(capsys, *track, '--fps', '0')
+    for fps in ('0', '-5', '1e-300', 'inf', 'nan'):
+        assert 'fps is' in fails(capsys, *track, '--fps', fps)
     assert 'tolerance' in fails(capsys, *track, '--tolerance', '-1')
     assert list(tmp_path.iterdir()) == []
 
@@ -287,7 +300,7 @@ def test_outputs_that_cannot_be(
     before = source.read_bytes()
     capsys.readouterr()
     assert 'is the source itself' in fails(capsys, 'track', source, '--bag', source)
-    assert 'part of the source' in fails(capsys, 'convert', source, source)
+    assert 'is the source itself' in fails(capsys, 'convert', source, source)
     assert 'must end in .mcap' in fails(capsys, 'convert', source, tmp_path / 'a.bag')
     assert source.read_bytes() == before
 
@@ -307,7 +320,7 @@ def test_stream_whose_size_changes_goes_on(
         )
     source = write_mcap(tmp_path / 'a.mcap', camera_messages(frames))
     out = [f'{tmp_path}/out.{end}' for end in ('csv', 'mp4', 'mcap')]
-    arguments = ['track', str(source), '--init', '30,40,40,40', '--output', out[0]]
+    arguments = ['track', str(source), '--init', '30,40,40,40', '--output', out[0], '--overwrite']
     for variant in VARIANTS:
         options = ['--variant', variant, '--video', out[1], '--bag', out[2]]
         assert main([*arguments, *options]) == 0

@@ -25,7 +25,7 @@ def run(*words: object) -> int:
 
 @pytest.mark.parametrize('name', ['walk.mcap', 'walk'])
 def test_what_is_written_is_what_was_simulated(tmp_path: Path, name: str) -> None:
-    dest = tmp_path / 'made' / name
+    dest = tmp_path / name
     assert run(dest, '--scenario', 'behind_box', '--seed', 3, *SMALL) == 0
     expected = list(simulate('behind_box', 3, 2.0, size=(160, 90)))
     with open_recording(dest, ReadOptions()) as recording:
@@ -177,3 +177,24 @@ def test_contact_sheet(tmp_path: Path) -> None:
     assert run('--contact-sheet', path, '--overwrite', '--scenario', 'group_crossing', *SMALL) == 0
     assert np.all(cv2.imread(str(path)) == (80, 80, 240), axis=2).any()
     assert run('--contact-sheet', tmp_path / 'sheet.gif', *SMALL) == 2
+
+
+def test_people_and_ids_are_read_back_and_may_be_replaced(tmp_path: Path) -> None:
+    words = ['--scenario', 'reunion', '--duration', '1', '--rate', '5', '--size', '160x120']
+    dest = tmp_path / 'reunion'
+    assert main(['simulate', str(dest), *words]) == 0
+    assert main(['simulate', str(dest), *words, '--overwrite']) == 0
+    from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
+
+    (written,) = open_dataset(str(dest), DatasetOptions(everyone=True))
+    size, rate = (160, 120), 5.0
+    options = DatasetOptions(everyone=True, seeds=(0,), rate_hz=rate, duration_s=1.0, size=size)
+    (rendered,) = open_dataset('sim:reunion', options)
+    for one, other in zip(written.open().samples, rendered.open().samples, strict=True):
+        assert [p.id for p in one.people] == [p.id for p in other.people]
+        for a, b in zip(one.people, other.people, strict=True):
+            assert a.box.iou(b.box) > 0.99
+            assert a.counts == b.counts
+            assert a.body is not None
+            assert b.body is not None
+            assert a.body.iou(b.body) > 0.99

@@ -477,4 +477,4 @@ def test_a_report_folder_that_cannot_be_written(scenes: Path, tmp_path: Path, ca
     (tmp_path / 'file').write_text('')
     words = ['evaluate', str(scenes), '--variants', 'kcf', '--report', str(tmp_path / 'file')]
     assert main(words) == 2
-    assert 'cannot be written' in capsys.readouterr().err
+    assert 'is a file: give the name of a folder' in capsys.readouterr().err

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from rgbd_kcf_tracker.extras import EXTRAS
 
 PACKAGE = 'rgbd_kcf_tracker'
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,7 +25,7 @@ SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
 # not know of it, but for SIDEWAYS.
 LAYERS = (
     ('errors',),
-    ('parameters', 'geometry'),
+    ('extras', 'parameters', 'geometry'),
     ('frame',),
     ('track',),
     ('features',),
@@ -36,6 +39,7 @@ LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 SIDEWAYS = {
     ('simulation', 'recordings'),
     ('bench', 'ros'),
+    ('bench', 'cli'),
     ('cli', 'view'),
 }
 # Within metric/, what stands in none of the folders being the last.
@@ -166,10 +170,84 @@ def test_engine_loads_without_ros() -> None:
     """A plain script that uses the tracker brings in no ROS and no recording library."""
     code = (
         'import sys, rgbd_kcf_tracker\n'
+        'assert "numpy" not in sys.modules\n'
+        'rgbd_kcf_tracker.create_tracker()\n'
+        'assert set(rgbd_kcf_tracker.__all__) <= set(dir(rgbd_kcf_tracker))\n'
         'heavy = {"rclpy", "rosbags", "mcap", "matplotlib", "jinja2"} & set(sys.modules)\n'
         'assert not heavy, heavy\n'
     )
     subprocess.run([sys.executable, '-c', code], check=True, cwd=ROOT, timeout=60)
+
+
+def test_the_command_line_starts_with_the_standard_library_alone() -> None:
+    """What the commands need is imported when they run: help and mistakes are told at once."""
+    code = (
+        'import sys\n'
+        'from rgbd_kcf_tracker.cli import main\n'
+        'early = {"argparse", "typing", "logging"} & set(sys.modules) - before\n'
+        'assert not early, early\n'
+        'try:\n'
+        '    main.main(["track", "--help"])\n'
+        'except SystemExit:\n'
+        '    pass\n'
+        'heavy = {"numpy", "scipy", "cv2", "mcap", "rosbags", "yaml"} & set(sys.modules)\n'
+        'assert not heavy, heavy\n'
+    )
+    code = f'import sys; before = set(sys.modules)\n{code}'
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=ROOT, timeout=60, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_extras_are_those_of_the_installation() -> None:
+    """Each module of an extra is imported only where the extra was asked for."""
+    setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
+    names = {'imageio_ffmpeg': 'imageio-ffmpeg'}
+    for extra, (modules, _) in EXTRAS.items():
+        line = re.search(rf'^{extra.upper()} = \[(.*)\]$', setup, re.MULTILINE)
+        assert line is not None
+        for module in modules:
+            assert f"'{names.get(module, module)}" in line[1], f'{module} is not in {extra}'
+
+
+WITHOUT = """
+import sys
+for name in ('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil'):
+    sys.modules[name] = None
+from rgbd_kcf_tracker.cli.main import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_the_commands_of_a_robot_need_no_extra(tmp_path: Path) -> None:
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, '-c', WITHOUT, *words], cwd=tmp_path, text=True, timeout=120,
+            capture_output=True, check=False,
+            env=os.environ | {'PYTHONPATH': str(ROOT), 'PATH': str(tmp_path)},
+        )  # fmt: skip
+
+    for words in (
+        ('simulate', 'walk', '--size', '160x90', '--rate', '5', '--duration', '1'),
+        ('info', 'walk'),
+        ('convert', 'walk', 'walk.mcap'),
+        ('track', 'walk.mcap', '--output', 'a.csv', '--bag', 'a.mcap', '--variant', 'kcf'),
+        ('bench', '--sizes', '64x64:32', '--frames', '20', '--variants', 'kcf'),
+    ):
+        done = run(*words)
+        assert done.returncode == 0, done.stderr
+    for said, *words in (
+        ('[report]', 'evaluate', 'walk', '--report', 'report'),
+        ('[video]', 'track', 'walk', '--video', 'a.mp4'),
+        ('[tools]', 'bench', '--soak', '20', '--variants', 'kcf'),
+    ):
+        done = run(*words)
+        assert done.returncode == 2, done.stderr
+        assert f"pip install 'rgbd_kcf_tracker{said}', or on Ubuntu: " in done.stderr
+        assert 'Traceback' not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['a.csv', 'a.mcap', 'walk', 'walk.mcap']
 
 
 @pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(ROOT)))

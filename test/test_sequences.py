@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +48,50 @@ def test_what_is_written_comes_back(tmp_path: Path) -> None:
     assert (tmp_path / 'a' / 'visible.txt').read_text() == '0.7500\n' * 4
 
 
+@dataclass(frozen=True)
+class Someone:
+    """One of several people, as a simulated scene tells of them."""
+
+    shown: Box | None
+    visible: Box | None
+    body: Box | None
+    visible_fraction: float
+    position: tuple[float, float, float]
+
+
+def test_a_frame_is_written_with_its_people_or_not_at_all(tmp_path: Path) -> None:
+    clear = Someone(Box(1, 2, 3, 4), Box(1, 2, 3, 4), Box(1, 2, 6, 8), 0.4, (0.5, 0.25, 2))
+    scarce = replace(clear, visible=None, visible_fraction=0.1)
+    hidden = Someone(None, None, Box(5, 5, 5, 5), 0.0, (0, 0, 3))
+    with SequenceWriter(tmp_path / 'a') as writer:
+        (writer.output.place / 'body_9.txt').mkdir()
+        with pytest.raises(RecordingError, match=r'body_9\.txt cannot be written'):
+            writer.write(FRAMES[0], people={7: clear, 8: hidden, 9: scarce})
+        (writer.output.place / 'body_9.txt').rmdir()
+        for frame in FRAMES:
+            writer.write(frame, people={7: clear, 8: hidden, 9: scarce})
+    with open_recording(tmp_path / 'a') as recording:
+        assert_same_frames(list(recording.frames()), FRAMES)
+    for name in ('groundtruth', 'body', 'visible'):
+        files = [tmp_path / 'a' / f'{name}_{who}.txt' for who in (7, 8, 9)]
+        assert [len(file.read_text().splitlines()) for file in files] == [4] * 3
+    assert (tmp_path / 'a' / 'visible_7.txt').read_text() == '0.4000,2000\n' * 4
+    assert (tmp_path / 'a' / 'visible_8.txt').read_text() == '0.0000,0\n' * 4
+    assert (tmp_path / 'a' / 'mot.txt').read_text().splitlines()[:3] == [
+        '1,7,1,2,3,4,1,0.5,0.25,2',
+        '1,9,1,2,3,4,0,0.5,0.25,2',
+        '2,7,1,2,3,4,1,0.5,0.25,2',
+    ]
+
+
 def test_a_written_folder_is_not_overwritten(tmp_path: Path) -> None:
     with SequenceWriter(tmp_path) as writer:
         writer.write(FRAMES[0])
-    with pytest.raises(RecordingError, match='holds a sequence already'):
+    with pytest.raises(RecordingError, match='is there already'):
         SequenceWriter(tmp_path)
+    (tmp_path / 'thesis.txt').write_text('years of work')
+    with pytest.raises(RecordingError, match=r'holds thesis\.txt, which we did not write'):
+        SequenceWriter(tmp_path, overwrite=True)
     with pytest.raises(ParameterError, match='png or jpg'):
         SequenceWriter(tmp_path / 'b', 'gif')
 
@@ -185,11 +225,12 @@ def test_numbers_are_sorted_as_numbers() -> None:
 
 
 def test_every_shared_sequence_reads(shared_data: Path) -> None:
-    paths = [*sorted((shared_data / 'rgbd').iterdir()), *sorted((shared_data / 'otb').iterdir())]
-    assert len(paths) == 8
+    paths = sorted(path.parent for path in shared_data.glob('*/*/rgb'))
+    assert {'rgbd', 'otb'} <= {path.parent.name for path in paths}
     for path in paths:
         with open_recording(path) as recording:
-            assert recording.groundtruth is not None
-            assert len(recording.groundtruth) == len(recording)
+            truth = recording.groundtruth
+            assert (truth is not None) == (path / 'groundtruth.txt').is_file(), path
+            assert truth is None or len(truth) == len(recording), path
             frame = next(recording.frames())
-            assert (frame.depth is not None) == (path.parent.name == 'rgbd')
+            assert (frame.depth is not None) == (path / 'depth').is_dir(), path

@@ -22,7 +22,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.errors import MissingExtraError, ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import (
@@ -42,7 +42,7 @@ HIDDEN = Track(None, TrackState.OCCLUDED, 0.0, 2.5)
 
 
 def test_csv_rows(tmp_path: Path) -> None:
-    path = tmp_path / 'new' / 'a.csv'
+    path = tmp_path / 'a.csv'
     with TrackCsvWriter(path) as writer:
         writer.write_track(0, 123, Track(None, TrackState.IDLE))
         writer.write_track(1, 456, SEEN)
@@ -71,6 +71,9 @@ def test_output_that_cannot_be_written(make: Any, tmp_path: Path) -> None:
         make(unwritable(tmp_path) / 'out.x')
     with pytest.raises(RecordingError, match='is a folder'):
         make(tmp_path)
+    with pytest.raises(RecordingError, match=r'there is no folder .*new: make it first'):
+        make(tmp_path / 'new' / 'out.mp4')
+    assert [p.name for p in tmp_path.iterdir()] == ['file']
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason='root may write anywhere')
@@ -80,19 +83,74 @@ def test_a_folder_without_write_permission(tmp_path: Path) -> None:
         TrackCsvWriter(tmp_path / 'a.csv')
 
 
-def test_a_full_disk_is_an_error() -> None:
-    if not Path('/dev/full').exists():
-        pytest.skip('no /dev/full on this system')
-    with pytest.raises(RecordingError, match='No space left'):
-        TrackCsvWriter('/dev/full')
+FILL_THE_DISK = """
+import resource, sys
+import numpy as np
+from pathlib import Path
+from bag_rig import make_frames
+from test_writers import SEEN
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter, TrackCsvWriter, VideoWriter
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
+frames = make_frames(60, (8, 6))
+noise = np.random.default_rng(3).integers(0, 256, (480, 640, 3)).astype(np.uint8)
+name = sys.argv[1]
+try:
+    if name.endswith('csv'):
+        with TrackCsvWriter(name) as out:
+            for number in range(10_000):
+                out.write_track(number, number, SEEN)
+    elif name.endswith('mcap'):
+        with BagWriter(name) as out:
+            for frame in frames:
+                out.write_frame(frame)
+    elif name.endswith('mp4'):
+        with VideoWriter(name) as out:
+            for number in range(200):
+                out.write(np.roll(noise, number, 1))
+    else:
+        with SequenceWriter(name) as out:
+            for frame in frames:
+                out.write(frame)
+except RecordingError as error:
+    print(error)
+"""
 
-    def write() -> None:
-        with BagWriter('/dev/full') as bag:
-            for frame in make_frames():
-                bag.write_frame(frame)
 
-    with pytest.raises(RecordingError, match='No space left'):
-        write()
+@pytest.mark.parametrize(
+    ('name', 'limit'), [('a.csv', 2000), ('a.mcap', 20_000), ('a.mp4', 700_000), ('a', 400)]
+)
+def test_what_was_written_before_a_disk_is_full_stays(
+    name: str, limit: int, tmp_path: Path
+) -> None:
+    """The limit on the size of files stands for the disk."""
+    path = tmp_path / name
+    said = subprocess.run(
+        [sys.executable, '-c', FILL_THE_DISK, str(path), str(limit)],
+        env=os.environ | {'PYTHONPATH': os.pathsep.join([*sys.path, os.path.dirname(__file__)])},
+        capture_output=True, text=True, check=True, timeout=60,
+    )  # fmt: skip
+    assert 'File too large' in said.stdout, said
+    assert str(path) in said.stdout
+    assert 'Traceback' not in said.stderr
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+    if name == 'a':
+        with open_recording(path) as recording:
+            assert len(list(recording.frames())) == recording.info().frames_with_depth > 10
+            assert recording.warnings == []
+        assert not list(path.rglob('*.part'))
+    elif name == 'a.csv':
+        assert len(path.read_text().splitlines()) > 20
+    elif name == 'a.mcap':
+        with open_recording(path) as recording:
+            assert len(list(recording.frames())) > 2
+    elif name == 'a.mp4':
+        assert len(frames_of(path)) > 20
+
+
+def test_devices_are_no_outputs() -> None:
+    with pytest.raises(RecordingError, match='is a device'):
+        TrackCsvWriter('/dev/null')
 
 
 # -- bag ---------------------------------------------------------------------------------------
@@ -255,14 +313,40 @@ def test_video_without_a_picture_leaves_no_file(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_video_of_an_unknown_kind_says_so(tmp_path: Path) -> None:
-    def write() -> None:
-        with VideoWriter(tmp_path / 'a.xyz') as writer:
-            for _ in range(50):
-                writer.write(np.zeros((480, 640, 3), np.uint8))
+def test_video_of_an_unknown_kind_leaves_no_file(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r'a\.xyz must end in \.mp4'):
+        VideoWriter(tmp_path / 'a.xyz')
+    assert list(tmp_path.iterdir()) == []
 
-    with pytest.raises(RecordingError, match='ffmpeg says'):
-        write()
+
+def test_video_without_ffmpeg_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, 'imageio_ffmpeg', None)
+    monkeypatch.setenv('PATH', str(tmp_path))
+    with pytest.raises(MissingExtraError, match=r'rgbd_kcf_tracker\[video\].*apt install ffmpeg'):
+        VideoWriter(tmp_path / 'a.mp4')
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize('size', [(320, 240), (640, 360), (640, 480)])
+def test_the_box_keeps_its_colour_in_small_videos(size: tuple[int, int], tmp_path: Path) -> None:
+    """H.264 keeps one colour for four pixels: a line must be wider than that, or it turns grey."""
+    rng = np.random.default_rng(5)
+    color = cv2.resize(rng.integers(0, 256, (12, 16, 3)).astype(np.uint8), size)
+    frame = Frame(color, None, 0)
+    box = Box(size[0] // 4, size[1] // 4, size[0] // 2, size[1] // 2)
+    with VideoWriter(tmp_path / 'a.mp4') as writer:
+        for _ in range(10):
+            writer.write_track(
+                frame, Track(box, TrackState.TRACKING, 0.9), Box(*box.as_tuple()).moved(7, 7)
+            )
+    shown = frames_of(tmp_path / 'a.mp4')[5]
+    factor = shown.shape[1] // size[0]
+    row = shown[round(box.y * factor + box.height * factor / 2), :, :].astype(int)
+    line = row[round(box.x * factor) - 4 : round(box.x * factor) + 4]
+    green = [p[1] - max(p[0], p[2]) for p in line]
+    assert sum(value > 80 for value in green) >= 2, line
 
 
 WRITE_VIDEO = """

@@ -116,7 +116,7 @@ def _simulate(options: argparse.Namespace, bag: Path) -> Truth:
         options.scenario, options.seed, options.rate, options.seconds, (int(width), int(height))
     )
     truth = Truth([], [], [])
-    with BagWriter(bag, KINECT2_QHD) as writer:
+    with BagWriter(bag, KINECT2_QHD, overwrite=True) as writer:
         for made in _progress(sequence, len(sequence), '1/4 simulate a Kinect V2'):
             writer.write_frame(made.frame)
             writer.write_truth(made.frame, made.visible, made.body)
@@ -217,8 +217,8 @@ def _write_results(
     cells = []
     with (
         open_recording(bag) as recording,
-        TrackCsvWriter(dest / 'boxes.csv') as table,
-        VideoWriter(dest / 'tracked.mp4', options.rate) as video,
+        TrackCsvWriter(dest / 'boxes.csv', overwrite=True) as table,
+        VideoWriter(dest / 'tracked.mp4', options.rate, overwrite=True) as video,
     ):
         frames = _progress(recording.frames(), len(tracks), '4/4 draw')
         for number, frame in enumerate(frames):

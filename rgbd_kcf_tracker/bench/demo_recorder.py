@@ -107,7 +107,7 @@ class Recorder:
                 else:
                     stamp = stamps[index] if index < len(stamps) else last
                 entries.append((stamp, name, raw))
-        with McapWriter(path) as bag:
+        with McapWriter(path, overwrite=True) as bag:
             for stamp, name, raw in sorted(entries, key=lambda e: (e[0], e[1])):
                 bag.write_raw(f'{TRACKER}/{name}', _KINDS[name][1], bytes(raw), stamp)
 

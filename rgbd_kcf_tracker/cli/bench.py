@@ -11,7 +11,10 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from rgbd_kcf_tracker.cli.common import progress
+from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.extras import require
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -55,8 +58,6 @@ def run(args: argparse.Namespace) -> int:
     # Before NumPy is imported: its libraries read them once.
     for name in THREADS:
         os.environ.setdefault(name, '1')
-    from tqdm import tqdm
-
     from rgbd_kcf_tracker.evaluation.contenders import variant
     from rgbd_kcf_tracker.evaluation.speed import Setting, measure, soak
     from rgbd_kcf_tracker.evaluation.table import Table
@@ -68,16 +69,18 @@ def run(args: argparse.Namespace) -> int:
     if args.soak is not None:
         if args.soak < FEWEST_FRAMES:
             raise ParameterError(f'--soak is {args.soak}: give at least {FEWEST_FRAMES}')
-        for contender in contenders:
+        require('tools', 'bench --soak')
+        for contender in progress(contenders, len(contenders), NAME):
             memory = soak(contender, settings[0], args.soak)
             held = ', '.join(f'{m:.0f}' for m in memory.samples)
             print(
                 f'{contender.name}: {memory.frames} frames, MiB held {held}: '
-                f'{memory.growth:+.1f} MiB from the first to the last'
+                f'{memory.growth:+.1f} MiB from the first to the last',
+                flush=True,
             )
         return 0
-    for setting in tqdm(settings, unit='size', disable=not sys.stderr.isatty()):
-        speeds = measure(contenders, setting, args.frames)
+    for setting in progress(settings, len(settings), NAME):
+        speeds = measure(contenders, setting, args.frames, lambda: interrupts.asked)
         reference = next((s.median() for s in speeds if s.contender == 'opencv:csrt'), None)
         rows = tuple(
             (
@@ -91,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         )
         columns = ('tracker', 'median ms', 'p95 ms', 'searching p95 ms', 'median / CSRT')
         print(Table('speed', str(setting), columns, rows, digits=2).text())
-        print()
+        print(flush=True)
     return 0
 
 

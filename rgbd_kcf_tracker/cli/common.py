@@ -6,10 +6,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
+from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
@@ -58,6 +61,13 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         metavar='FX,FY,CX,CY',
         help="camera in pixels, instead of the recording's own",
     )
+    group.add_argument(
+        '--max-pixels',
+        metavar='N',
+        type=int,
+        default=1 << 24,
+        help='largest image that is read (default 16777216: 4096x4096)',
+    )
 
 
 def read_options(args: argparse.Namespace) -> ReadOptions:
@@ -75,6 +85,7 @@ def read_options(args: argparse.Namespace) -> ReadOptions:
         tolerance_s=args.tolerance,
         fps=args.fps,
         intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+        max_pixels=args.max_pixels,
     )
 
 
@@ -122,14 +133,44 @@ def parse_assignments(items: Sequence[str]) -> dict[str, str]:
     return values
 
 
-def progress(items: Iterable[T], total: int | None, label: str) -> Iterable[T]:
-    """``items`` with a bar on standard error, if that is a terminal."""
-    if not sys.stderr.isatty():
-        return items
+def add_overwrite_option(parser: argparse._ActionsContainer, what: str) -> None:
+    """Declare ``--overwrite``, which is the same for every command that writes."""
+    parser.add_argument(
+        '--overwrite', action='store_true', help=f'replace {what}; the source never is'
+    )
+
+
+def progress(items: Iterable[T], total: int | None, label: str) -> Iterator[T]:
+    """``items``, with a bar if standard error is a terminal; Ctrl-C ends it between two of them.
+
+    The bar is tqdm's, of the extra ``tools``; without it there is none.
+    """
+    if sys.stderr.isatty() and find_spec('tqdm') is not None:
+        from tqdm import tqdm
+
+        items = tqdm(items, total=total, desc=label, unit='frame', leave=False)
+    with interrupts.held():
+        interrupts.check()  # it may have come up where a library swallowed it
+        for item in items:
+            yield item
+            interrupts.check()
+
+
+@contextlib.contextmanager
+def counter(total: int, unit: str) -> Iterator[Callable[[int, str], None]]:
+    """A function that counts what is done, with a bar as :func:`progress` has it."""
+    if not sys.stderr.isatty() or find_spec('tqdm') is None:
+        yield lambda done, name: None
+        return
     from tqdm import tqdm
 
-    bar: Iterable[T] = tqdm(items, total=total, desc=label, unit='frame', leave=False)
-    return bar
+    with tqdm(total=total, unit=unit, leave=False, smoothing=0.05) as bar:
+
+        def count(done: int, name: str) -> None:
+            bar.set_postfix_str(name, refresh=False)
+            bar.update(done)
+
+        yield count
 
 
 def warn(text: str) -> None:

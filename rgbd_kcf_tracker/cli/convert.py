@@ -12,6 +12,7 @@ from typing import Any
 from rgbd_kcf_tracker.cli.common import (
     SOURCE_HELP,
     Warnings,
+    add_overwrite_option,
     add_reading_options,
     progress,
     read_options,
@@ -31,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--compression',
         choices=('none', 'lz4', 'zstd'),
-        default='none',
-        help='of the chunks (default none: fastest to read)',
+        default='zstd',
+        help='of the chunks (default zstd; none is fastest to read)',
     )
     parser.add_argument(
         '--camera',
@@ -41,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="topic names for a folder: the tracker node's own (generic, the default) or "
         "kinect2_bridge's; a bag keeps its names",
     )
+    add_overwrite_option(parser, 'the file if it is there')
     add_reading_options(parser)
 
 
@@ -54,16 +56,16 @@ def run(args: argparse.Namespace) -> int:
         open_recording,
     )
     from rgbd_kcf_tracker.recordings.copying import copy_bag, write_recording
+    from rgbd_kcf_tracker.recordings.files import require_source
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
     from rgbd_kcf_tracker.recordings.rawbag import RawBag
     from rgbd_kcf_tracker.recordings.sequences import is_sequence_folder
 
     source, dest = Path(args.source), Path(args.dest)
     if dest.suffix != '.mcap':
         raise RecordingError(f'{dest} must end in .mcap: that is the format written')
-    if not source.exists():
-        raise RecordingError(f'{source} does not exist')
-    if dest.resolve() == source.resolve() or source.resolve() in dest.resolve().parents:
-        raise RecordingError(f'{dest} is part of the source: give another name')
+    require_source(source)
+    check_outputs({'DEST': dest}, [source], args.overwrite)
 
     def shown(items: Any, total: int) -> Any:
         return progress(items, total, NAME)
@@ -78,6 +80,7 @@ def run(args: argparse.Namespace) -> int:
                 topics=names[args.camera],
                 compression=args.compression,
                 progress=shown,
+                overwrite=args.overwrite,
             )
             warnings.show()
         print(f'{dest}: {count} frames')
@@ -85,11 +88,19 @@ def run(args: argparse.Namespace) -> int:
     bag = RawBag(source)
     try:
         Warnings(bag.warnings).show()
-        count, problems = copy_bag(bag, dest, compression=args.compression, progress=shown)
+        count, problems = copy_bag(
+            bag,
+            dest,
+            compression=args.compression,
+            progress=shown,
+            overwrite=args.overwrite,
+        )
         for problem in problems[:20]:
             warn(problem)
         if len(problems) > 20:
             warn(f'and {len(problems) - 20} more')
+        if not count:
+            raise RecordingError(f'{source} holds no message that can be read: nothing is written')
         topics = sum(1 for topic in bag.topics.values() if len(topic))
         print(f'{dest}: {count} messages of {topics} topics')
     finally:

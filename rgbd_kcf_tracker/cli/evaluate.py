@@ -13,8 +13,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_assignments, parse_intrinsics, progress
+from rgbd_kcf_tracker.cli.common import (
+    add_overwrite_option,
+    counter,
+    parse_assignments,
+    parse_intrinsics,
+    progress,
+)
+from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.extras import require
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -50,7 +58,8 @@ examples:
   rgbd-kcf evaluate MOT17/train --everyone --boxes 'SORT=sort/' --report report/
   rgbd-kcf evaluate recordings/ --identity --report report/
 
-Run again with the same --report to go on after an interruption, or to add trackers.
+Ctrl-C finishes the runs under way and reports what there is; pressed again it stops at once. Run
+again with the same --report to go on, or to add trackers.
 """
 
 
@@ -141,20 +150,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--export', action='append', default=[], choices=('princeton', 'vot'),
         help='also write results as this benchmark takes them',
     )  # fmt: skip
+    add_overwrite_option(group, 'files in a DIR that holds other things than a report')
 
 
 def run(args: argparse.Namespace) -> int:
     """Run everything that is not done yet, then write the report; returns the exit code."""
+    require('report', NAME)
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.perframe import collect
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.tables import overview
 
-    if args.identity:
-        return _identity(args)
     if args.everyone:
         _refuse(args, '--everyone', ('short_term', 'eao_lengths', 'export'))
+    _check_report(args)
+    if args.identity:
+        return _identity(args)
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
@@ -162,8 +174,7 @@ def run(args: argparse.Namespace) -> int:
     if jobs < 1:
         raise ParameterError(f'--jobs is {jobs}: give 1 or more')
     options = _run_options(args, jobs)
-    _check_writable(args.report)
-
+    _make_report_folder(args.report)
     failures = _run(sequences, contenders, args.report, options)
     if args.everyone:
         return _report_everyone(args, sequences, contenders, options, failures)
@@ -173,11 +184,19 @@ def run(args: argparse.Namespace) -> int:
     heading = _heading(args, ablated, eao_lengths)
     if not collected.results and collected.unmeasured:
         print(f'{len(collected.unmeasured)} sequences were run; none has ground truth to measure')
-    else:
+    elif collected.results or not interrupts.asked:
         measured = write_report(args.report, collected, contenders, failures, heading)
         print(overview(measured).text())
         print(f'\nreport: {args.report / PAGE}')
+    return _end(failures)
+
+
+def _end(failures: Sequence[Failure]) -> int:
+    """List what failed; returns the exit code."""
     _list_failures(failures)
+    if interrupts.asked:
+        print('stopped; the same command goes on from here', file=sys.stderr)
+        return EXIT_INTERRUPTED
     return EXIT_FAILURES if failures else 0
 
 
@@ -198,7 +217,7 @@ def _identity(args: argparse.Namespace) -> int:
     options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'jobs', 'fresh')
     _refuse(args, '--identity', (*options, 'short_term', 'eao_lengths', 'export'))
     sequences = _distinct([s for text in args.dataset for s in open_dataset(text, _data(args))])
-    _check_writable(args.report)
+    _make_report_folder(args.report)
     seen, failures = [], []
     for sequence in sequences:
         try:
@@ -211,8 +230,7 @@ def _identity(args: argparse.Namespace) -> int:
     table = write_identity_report(args.report, pairs, failures, _heading(args))
     print(table.text())
     print(f'\nreport: {args.report / PAGE}')
-    _list_failures(failures)
-    return EXIT_FAILURES if failures else 0
+    return _end(failures)
 
 
 def _run_options(args: argparse.Namespace, jobs: int) -> RunOptions:
@@ -245,11 +263,11 @@ def _report_everyone(
         for contender in contenders
         if is_done(args.report, sequence, contender, options)
     ]
-    table = write_everyone_report(args.report, results, contenders, failures, _heading(args))
-    print(table.text())
-    print(f'\nreport: {args.report / PAGE}')
-    _list_failures(failures)
-    return EXIT_FAILURES if failures else 0
+    if results or not interrupts.asked:
+        table = write_everyone_report(args.report, results, contenders, failures, _heading(args))
+        print(table.text())
+        print(f'\nreport: {args.report / PAGE}')
+    return _end(failures)
 
 
 def _heading(
@@ -266,23 +284,11 @@ def _heading(
 def _run(
     sequences: list[Benchmark], contenders: list[Contender], folder: Path, options: RunOptions
 ) -> list[Failure]:
-    from tqdm import tqdm
-
     from rgbd_kcf_tracker.evaluation.runner import run as run_all
 
-    total = len(sequences) * len(contenders)
-    with tqdm(total=total, unit='run', disable=None, leave=False, smoothing=0.05) as bar:
-
-        def report(done: int, name: str) -> None:
-            bar.set_postfix_str(name, refresh=False)
-            bar.update(done)
-
-        try:
-            return run_all(sequences, contenders, folder, options, report)
-        except KeyboardInterrupt:
-            bar.close()
-            print('stopped; the same command goes on from here', file=sys.stderr)
-            raise
+    notice = 'the runs under way are finished, then it stops; Ctrl-C again stops at once'
+    with counter(len(sequences) * len(contenders), 'run') as report, interrupts.held(notice):
+        return run_all(sequences, contenders, folder, options, report, lambda: interrupts.asked)
 
 
 def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
@@ -412,14 +418,35 @@ def _list_failures(failures: Sequence[Failure]) -> None:
         print(f'  {failure.sequence}{tracker}: {last}', file=sys.stderr)
 
 
-def _check_writable(folder: Path) -> None:
+def _check_report(args: argparse.Namespace) -> None:
+    """Refuse a folder that lies in the data, or holds other things than a report."""
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
+    from rgbd_kcf_tracker.evaluation.report import REPORT_NAMES
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+
+    sources = [text for text in args.dataset if not text.startswith(PREFIX)]
+    check_outputs({'--report': args.report}, sources, overwrite=True, folders=('--report',))
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        held = set(os.listdir(args.report)) if args.report.exists() else set()
+    except OSError as error:
+        raise RecordingError(f'{args.report} cannot be read: {error.strerror or error}') from None
+    if 'results' not in held and held - REPORT_NAMES and not args.overwrite:
+        raise RecordingError(
+            f'{args.report} is there already, and is no report: give another name, or add '
+            '--overwrite to write into it'
+        )
+
+
+def _make_report_folder(folder: Path) -> None:
+    from rgbd_kcf_tracker.recordings.outputs import cannot_write, make_folder
+
+    make_folder(folder)
+    try:
         probe = folder / '.write'
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise RecordingError(f'{folder} cannot be written: {error.strerror or error}') from None
+        raise RecordingError(cannot_write(folder, error)) from None
 
 
 def _words(text: str) -> list[str]:

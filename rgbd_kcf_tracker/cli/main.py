@@ -1,25 +1,28 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The command ``rgbd-kcf``: finds the subcommand, and turns errors into messages."""
+"""The command ``rgbd-kcf``: finds the subcommand, and turns errors into messages.
+
+As little as can be is imported before :func:`main` takes care of Ctrl-C.
+"""
 
 from __future__ import annotations
 
-import argparse
-import contextlib
-import importlib
 import os
 import sys
-from collections.abc import Sequence
-from typing import Protocol, cast
 
-from rgbd_kcf_tracker.errors import RgbdKcfError
+TYPE_CHECKING = False  # typing, too, takes its time
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Sequence
+    from typing import Protocol
+else:
+    Protocol = object
 
 PROGRAM = 'rgbd-kcf'
 SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'bench')
 
 EXIT_USAGE = 2
-EXIT_INTERRUPTED = 130
 
 
 class Subcommand(Protocol):
@@ -42,21 +45,32 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Errors that a user can mend are one message on standard error and exit code 2, Ctrl-C is 130.
     """
-    arguments = list(sys.argv[1:] if argv is None else argv)
-    parser = _parser(arguments)
-    args = parser.parse_args(arguments)
     try:
-        code = int(args.run(args))
-        sys.stdout.flush()
-        return code
+        return _run(list(sys.argv[1:] if argv is None else argv))
+    except KeyboardInterrupt:
+        print(f'{PROGRAM}: interrupted', file=sys.stderr)
+        return 130
+
+
+def _run(arguments: list[str]) -> int:
+    from rgbd_kcf_tracker.cli.interrupts import interrupts
+    from rgbd_kcf_tracker.errors import RgbdKcfError
+
+    try:
+        with interrupts.handled():
+            _prepare_messages()
+            arguments = _joined(arguments)
+            args = _parser(arguments).parse_args(arguments)
+            code = int(args.run(args))
+            sys.stdout.flush()
+            return code
     except RgbdKcfError as error:
         print(f'{PROGRAM}: error: {error}', file=sys.stderr)
         return EXIT_USAGE
-    except KeyboardInterrupt:
-        print(f'{PROGRAM}: interrupted', file=sys.stderr)
-        return EXIT_INTERRUPTED
     except BrokenPipeError:
         # The reader of our output is gone (``| head``): nothing is left to say.
+        import contextlib
+
         with contextlib.suppress(OSError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -66,7 +80,34 @@ def main(argv: Sequence[str] | None = None) -> int:
         return EXIT_USAGE
 
 
+def _prepare_messages() -> None:
+    """Names that are no UTF-8 are printed as they are, and warnings as ours."""
+    import io
+    import logging
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors='surrogateescape')
+    if logging.lastResort is not None:
+        logging.lastResort.setFormatter(logging.Formatter('warning: %(message)s'))
+
+
+def _joined(arguments: list[str]) -> list[str]:
+    """``--init -10,100,50,50`` as ``--init=-10,100,50,50``: a number is no option."""
+    joined: list[str] = []
+    for word in arguments:
+        number = word[:1] == '-' and word[1:2] in tuple('.0123456789')
+        if number and joined and joined[-1].startswith('--') and '=' not in joined[-1]:
+            joined[-1] += f'={word}'
+        else:
+            joined.append(word)
+    return joined
+
+
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
+    import argparse
+    import importlib
+    from typing import cast
+
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
         description='Follow one target in colour and depth, in recordings and benchmarks. '

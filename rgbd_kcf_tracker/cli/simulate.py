@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import argparse
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rgbd_kcf_tracker.cli.common import progress
+from rgbd_kcf_tracker.cli.common import add_overwrite_option, progress
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
@@ -94,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='stamps that vary, lost frames and gaps, as of a camera on a busy machine',
     )
-    parser.add_argument('--overwrite', action='store_true', help='replace what is at DEST')
+    add_overwrite_option(parser, 'what is at DEST')
     parser.add_argument('--list', action='store_true', help='list the scenarios and stop')
     parser.add_argument(
         '--color-format',
@@ -105,8 +104,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--compression',
         choices=('none', 'lz4', 'zstd'),
-        default='none',
-        help='of the chunks of an mcap file (default: none)',
+        default='zstd',
+        help='of the chunks of an mcap file (default: zstd)',
     )
 
 
@@ -133,13 +132,13 @@ def run(args: argparse.Namespace) -> int:
     if args.contact_sheet is not None:
         _draw_sheet(args, jobs, size)
         return 0
-    for dest, (name, seed) in zip(_destinations(args, jobs), jobs, strict=True):
-        _prepare(dest, args.overwrite)
+    destinations = _destinations(args, jobs)
+    for dest, (name, seed) in zip(destinations, jobs, strict=True):
         sequence = simulate(name, seed, args.rate, args.duration, size, args.irregular)
         if dest.suffix == '.mcap':
-            _record(sequence, dest, lambda path: _bag(path, size, args.compression))
+            _record(sequence, dest, lambda path: _bag(path, size, args.compression, args.overwrite))
         else:
-            _record(sequence, dest, lambda path: _folder(path, args.color_format))
+            _record(sequence, dest, lambda path: _folder(path, args.color_format, args.overwrite))
     return 0
 
 
@@ -148,13 +147,14 @@ def _draw_sheet(
 ) -> None:
     import cv2
 
+    from rgbd_kcf_tracker.recordings.outputs import OutputFile, check_outputs
     from rgbd_kcf_tracker.simulation import simulate
     from rgbd_kcf_tracker.simulation.contact_sheet import contact_sheet
 
     path: Path = args.contact_sheet
     if path.suffix not in ('.jpg', '.png'):
         raise ParameterError(f'{path} must end in .jpg or .png')
-    _prepare(path, args.overwrite)
+    check_outputs({'--contact-sheet': path}, overwrite=args.overwrite)
     scenes = (
         simulate(name, seed, args.rate, args.duration, size, args.irregular) for name, seed in jobs
     )
@@ -162,26 +162,37 @@ def _draw_sheet(
     done, data = cv2.imencode(path.suffix, sheet, [int(cv2.IMWRITE_JPEG_QUALITY), 78])
     if not done:
         raise RecordingError(f'{path} cannot be encoded: fewer scenes make a smaller picture')
+    output = OutputFile(path, args.overwrite)
     try:
-        path.write_bytes(data.tobytes())
-    except OSError as error:
-        raise RecordingError(f'cannot write {path}: {error.strerror}') from error
+        output.write(data.tobytes())
+    except BaseException:
+        output.end(whole=False, anything=False)
+        raise
+    output.end(whole=True, anything=True)
     print(f'{path}: {len(jobs)} scenes')
 
 
 def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list[Path]:
-    """Where each scene goes."""
+    """Where each scene goes; all are looked at before the first is rendered."""
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
+
     dest: Path = args.dest
     if len(jobs) == 1:
         if args.format == 'mcap' and dest.suffix != '.mcap':
             raise ParameterError(f'--format mcap, but {dest} does not end in .mcap')
         if args.format == 'folder' and dest.suffix == '.mcap':
             raise ParameterError(f'--format folder, but {dest} ends in .mcap')
+        folders = () if dest.suffix == '.mcap' else ('DEST',)
+        check_outputs({'DEST': dest}, overwrite=args.overwrite, folders=folders)
         return [dest]
     if dest.suffix == '.mcap':
         raise ParameterError(f'{dest} is one file for {len(jobs)} scenes: name a folder')
     suffix = '.mcap' if args.format == 'mcap' else ''
-    return [dest / f'{name}_{seed}{suffix}' for name, seed in jobs]
+    make_folder(dest)
+    found = [dest / f'{name}_{seed}{suffix}' for name, seed in jobs]
+    named = {path.name: path for path in found}
+    check_outputs(named, overwrite=args.overwrite, folders=() if suffix else named)
+    return found
 
 
 def _parse_size(text: str) -> tuple[int, int]:
@@ -189,23 +200,6 @@ def _parse_size(text: str) -> tuple[int, int]:
     if not (cross and width.strip().isdecimal() and height.strip().isdecimal()):
         raise ParameterError(f'--size is {text!r}: give WIDTHxHEIGHT, such as 960x540')
     return int(width), int(height)
-
-
-def _prepare(dest: Path, overwrite: bool) -> None:
-    """Make sure that nothing is overwritten unasked, and that the parent folder is there."""
-    occupied = dest.is_file() or (dest.is_dir() and any(dest.iterdir()))
-    if occupied and not overwrite:
-        raise RecordingError(f'{dest} exists already: choose another name, or add --overwrite')
-    if occupied and dest.is_dir():
-        if not (dest / 'rgb').is_dir():
-            raise RecordingError(f'{dest} is a folder but no sequence: it will not be replaced')
-        shutil.rmtree(dest)
-    elif occupied:
-        dest.unlink()
-    try:
-        dest.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(f'cannot create {dest.parent}: {error.strerror}') from error
 
 
 def _record(
@@ -227,11 +221,13 @@ def _record(
 
 
 @contextmanager
-def _bag(dest: Path, size: tuple[int, int], compression: str) -> Iterator[WriteFrame]:
+def _bag(
+    dest: Path, size: tuple[int, int], compression: str, overwrite: bool
+) -> Iterator[WriteFrame]:
     from rgbd_kcf_tracker.recordings import KINECT2_HD, KINECT2_QHD, KINECT2_SD, BagWriter
 
     topics = {(1920, 1080): KINECT2_HD, (512, 424): KINECT2_SD}.get(size, KINECT2_QHD)
-    with BagWriter(dest, topics, compression=compression) as bag:
+    with BagWriter(dest, topics, compression=compression, overwrite=overwrite) as bag:
 
         def write(simulated: SimulatedFrame) -> None:
             bag.write_frame(simulated.frame)
@@ -241,16 +237,18 @@ def _bag(dest: Path, size: tuple[int, int], compression: str) -> Iterator[WriteF
 
 
 @contextmanager
-def _folder(dest: Path, color_format: str) -> Iterator[WriteFrame]:
+def _folder(dest: Path, color_format: str, overwrite: bool) -> Iterator[WriteFrame]:
     from rgbd_kcf_tracker.recordings import SequenceWriter
 
-    with SequenceWriter(dest, color_format) as folder:
+    with SequenceWriter(dest, color_format, overwrite) as folder:
 
         def write(simulated: SimulatedFrame) -> None:
             folder.write(
-                simulated.frame, simulated.visible, simulated.body, simulated.visible_fraction
+                simulated.frame,
+                simulated.visible,
+                simulated.body,
+                simulated.visible_fraction,
+                simulated.truths if len(simulated.truths) > 1 else None,
             )
-            if len(simulated.truths) > 1:
-                folder.write_people(simulated.truths)
 
         yield write

@@ -11,12 +11,12 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rgbd_kcf_tracker.cli.common import (
     SOURCE_HELP,
     Warnings,
+    add_overwrite_option,
     add_reading_options,
     parse_assignments,
     parse_box,
@@ -81,6 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     output.add_argument(
         '--bag', metavar='FILE.mcap', help="the frames with the tracker's topics beside them"
     )
+    add_overwrite_option(output, 'files that are there')
     add_reading_options(parser)
 
 
@@ -89,9 +90,9 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.recordings import open_recording
     from rgbd_kcf_tracker.track import require_inside
 
+    _check_outputs(args)
     follower = _make_follower(args)
     given = [parse_box(text) for text in args.init]
-    _check_outputs(args)
     with open_recording(args.source, read_options(args)) as recording:
         start, end = _frame_range(args, recording)
         warnings = Warnings(recording.warnings)
@@ -173,23 +174,27 @@ class _Sinks:
         self.truth = recording.groundtruth
         self.body = recording.groundtruth_body
         self.written = [p for p in (args.output, args.mot, args.video, args.bag) if p and p != '-']
-        self.csv = self.table = self.mot = None
-        if args.output and _several(args):
-            self.table = TracksCsvWriter(args.output)
+        self.csv = self.table = self.mot = self.video = self.bag = None
+        if args.output and self.several:
+            self.table = TracksCsvWriter(args.output, args.overwrite)
             stack.enter_context(self.table)
         elif args.output:
-            self.csv = stack.enter_context(TrackCsvWriter(args.output))
+            self.csv = stack.enter_context(TrackCsvWriter(args.output, args.overwrite))
         if args.mot:
-            self.mot = stack.enter_context(MotWriter(args.mot))
-        self.video = None
+            self.mot = stack.enter_context(MotWriter(args.mot, args.overwrite))
         if args.video:
             rate = recording.info().rate_hz or args.fps
-            self.video = stack.enter_context(VideoWriter(args.video, rate))
-        self.bag = None
+            self.video = stack.enter_context(VideoWriter(args.video, rate, args.overwrite))
         if args.bag:
             topics, depth_encoding = output_topics(recording)
             self.bag = stack.enter_context(
-                BagWriter(args.bag, topics, depth_encoding=depth_encoding, annotate=True)
+                BagWriter(
+                    args.bag,
+                    topics,
+                    depth_encoding=depth_encoding,
+                    annotate=True,
+                    overwrite=args.overwrite,
+                )
             )
 
     def write(self, number: int, frame: Frame, tracks: Mapping[int, Track]) -> None:
@@ -274,12 +279,17 @@ def _make_follower(args: argparse.Namespace) -> _One | _Several:
 
 
 def _check_outputs(args: argparse.Namespace) -> None:
-    """Refuse an output that would overwrite the source, before anything is opened."""
-    source = Path(args.source).resolve()
-    for name in ('output', 'mot', 'video', 'bag'):
-        value = getattr(args, name)
-        if value and value != '-' and Path(value).resolve() == source:
-            raise RecordingError(f'--{name} {value} is the source itself: give another name')
+    """Refuse outputs that cannot be written, or must not, before anything is done."""
+    from rgbd_kcf_tracker.recordings.files import require_source
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+    from rgbd_kcf_tracker.recordings.video import require_video
+
+    require_source(args.source)
+    outputs = {f'--{name}': getattr(args, name) for name in ('output', 'mot', 'video', 'bag')}
+    written = {option: path for option, path in outputs.items() if path and path != '-'}
+    check_outputs(written, [args.source], args.overwrite)
+    if args.video:
+        require_video(args.video)
 
 
 def _frame_range(args: argparse.Namespace, recording: Recording) -> tuple[int, int]:

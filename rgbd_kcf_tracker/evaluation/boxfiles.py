@@ -19,11 +19,10 @@ import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
-from rgbd_kcf_tracker.evaluation.datasets.images import box_or_none
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.textfiles import read_lines
+from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
 from rgbd_kcf_tracker.track import Track, TrackState
 
 _SUFFIXES = ('.csv', '.txt')

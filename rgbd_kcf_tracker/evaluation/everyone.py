@@ -29,9 +29,10 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
-from rgbd_kcf_tracker.evaluation.store import moved_into_place, read_json, slug, write_json
+from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.recordings.mot import MotWriter, Sightings, read_mot
+from rgbd_kcf_tracker.recordings.mot import Sightings, mot_text, read_mot
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.track import Track
 
 __all__ = ['EveryoneResult', 'Followed', 'Targets', 'follow', 'score']
@@ -243,10 +244,11 @@ def run(
         raise RgbdKcfError(f'{sequence.name} has no frames')
     places = Places(folder, sequence.name)
     rows, bodies = truth.sightings(), truth.bodies()
-    _write(places.truth, rows)
+    write_atomically(places.truth, mot_text(rows))
     if bodies is not None:
         known = ~np.isnan(bodies[:, 0])
-        _write(places.bodies, Sightings.of(rows.frames[known], rows.ids[known], bodies[known]))
+        whole = Sightings.of(rows.frames[known], rows.ids[known], bodies[known])
+        write_atomically(places.bodies, mot_text(whole))
     failed = []
     for contender in contenders:
         one = passes[contender.name]
@@ -259,7 +261,7 @@ def run(
         if one.error:
             failed.append((contender.name, one.error))
             continue
-        _write(places.tracks(contender.name), tracks)
+        write_atomically(places.tracks(contender.name), mot_text(tracks))
         write_json(
             places.meta(contender.name),
             {
@@ -323,8 +325,3 @@ def _from_file(
         [place[int(f)] for f in rows.frames], rows.ids, rows.boxes, rows.scores, rows.shares,
         rows.positions,
     )  # fmt: skip
-
-
-def _write(path: Path, sightings: Sightings) -> None:
-    with moved_into_place(path) as temporary, MotWriter(temporary) as writer:
-        writer.write_sightings(sightings)

@@ -14,6 +14,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
+import scipy
+
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation import boxfiles, everyone
@@ -31,31 +35,33 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
-    write_atomically,
     write_json,
     write_tracks,
     write_truth,
 )
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 _FORMAT = 2
 """Of what a run leaves; another one is not read, but run again."""
 
-_CODE = (
-    'geometry.py', 'frame.py', 'track.py', 'parameters.py', 'variants.py',
-    'features', 'thesis', 'metric', 'simulation', 'recordings',
-)  # fmt: skip
+# What makes no frame and no track. All else is part of the digest, also what will be added.
+_ELSEWHERE = ('bench', 'cli', 'live', 'ros', 'view')
+_MEASURING = 'evaluation'
+_RUNNING = ('datasets', 'boxfiles.py', 'contenders.py', 'everyone.py', 'jobs.py', 'passes.py')
+"""What of the evaluation makes frames and tracks; the rest measures and shows them."""
 
 
 @cache
-def code_digest() -> str:
-    """Version and digest of the code that makes frames and tracks."""
-    root = Path(rgbd_kcf_tracker.__file__).parent
-    digest = hashlib.sha256(rgbd_kcf_tracker.__version__.encode())
-    for name in _CODE:
-        place = root / name
-        for path in [place] if place.is_file() else sorted(place.rglob('*.py')):
-            digest.update(path.read_bytes())
+def code_digest(root: Path = Path(rgbd_kcf_tracker.__file__).parent) -> str:
+    """Digest of the code that makes frames and tracks, and of the libraries that it calls."""
+    versions = rgbd_kcf_tracker.__version__, np.__version__, scipy.__version__, cv2.__version__
+    digest = hashlib.sha256(' '.join(versions).encode())
+    for path in sorted(root.rglob('*.py')):
+        parts = path.relative_to(root).parts
+        if parts[0] in _ELSEWHERE or (parts[0] == _MEASURING and parts[1] not in _RUNNING):
+            continue
+        digest.update('/'.join(parts).encode() + b'\0' + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -17,13 +17,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
+from rgbd_kcf_tracker.recordings.images import decode_color_bytes
+from rgbd_kcf_tracker.recordings.textfiles import read_lines
 from rgbd_kcf_tracker.variants import create_tracker
 
 REFERENCE = 'KCF_GaussHog'
@@ -64,12 +66,8 @@ def read_boxes(path: Path) -> Boxes:
     Raises:
         DatasetError: naming file and line, where a line is no box.
     """
-    try:
-        lines = path.read_text(encoding='utf-8').splitlines()
-    except OSError as error:
-        raise DatasetError(f'{path}: {error.strerror or error}') from None
     rows = []
-    for number, line in enumerate(lines, start=1):
+    for number, line in enumerate(read_lines(path), start=1):
         if not line.strip():
             continue
         try:
@@ -93,10 +91,10 @@ def track_boxes(images: Sequence[Path], first: Box) -> Boxes:
     tracker = create_tracker('kcf')
     rows = []
     for index, path in enumerate(images):
-        color = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if color is None:
-            raise DatasetError(f'{path} is not an image that can be read')
-        frame = Frame(color)
+        try:
+            frame = Frame(decode_color_bytes(memoryview(read_file(path, MAX_IMAGE))))
+        except RgbdKcfError as error:
+            raise DatasetError(f'{path} is not an image that can be read: {error}') from None
         track = tracker.start(frame, first) if index == 0 else tracker.update(frame)
         rows.append((track.box or first).as_tuple())
     return np.array(rows)

@@ -30,8 +30,8 @@ from rgbd_kcf_tracker.evaluation.store import (
     read_json,
     read_tracks,
     read_truth,
-    write_atomically,
 )
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 HEADER = (
     'tracker', 'sequence', 'frame', 'stamp_ns', 'there', 'said', 'iou', 'dx_px', 'dy_px', 'ratio',

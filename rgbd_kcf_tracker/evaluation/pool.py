@@ -23,16 +23,30 @@ Report = Callable[[int, str], None]
 _THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS', 'NUMEXPR_NUM_THREADS')
 
 
-def run_parallel(jobs: list[Job], count: int, report: Report) -> list[Failure]:
-    """Run jobs in processes; one that kills its process (out of memory, say) fails alone."""
+def run_parallel(
+    jobs: list[Job],
+    count: int,
+    report: Report,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[Failure]:
+    """Run jobs in processes; one that kills its process (out of memory, say) fails alone.
+
+    Args:
+        jobs: to run.
+        count: processes.
+        report: is told of each that is done.
+        stopped: is asked whether to begin no more; those under way are finished.
+    """
     failures: list[Failure] = []
     suspects: list[Job] = []
     waiting = list(jobs)
-    while waiting:
-        waiting, broken = _run_pool(waiting, count, report, failures)
+    while waiting and not stopped():
+        waiting, broken = _run_pool(waiting, count, report, stopped, failures)
         suspects.extend(broken)
     for job in suspects:
-        _, broken = _run_pool([job], 1, report, failures)
+        if stopped():
+            break
+        _, broken = _run_pool([job], 1, report, stopped, failures)
         for lost in broken:
             failures.append(
                 Failure(lost.sequence.name, '', 'the process died: out of memory, or a crash')
@@ -42,7 +56,11 @@ def run_parallel(jobs: list[Job], count: int, report: Report) -> list[Failure]:
 
 
 def _run_pool(
-    jobs: list[Job], count: int, report: Report, failures: list[Failure]
+    jobs: list[Job],
+    count: int,
+    report: Report,
+    stopped: Callable[[], bool],
+    failures: list[Failure],
 ) -> tuple[list[Job], list[Job]]:
     """Returns the jobs that were not begun, and those that ran when the pool broke."""
     with _single_threaded():
@@ -54,9 +72,12 @@ def _run_pool(
         broken: list[Job] = []
         try:
             while (waiting or running) and not broken:
-                while waiting and len(running) < count:
+                while waiting and len(running) < count and not stopped():
                     job = waiting.pop()
-                    running[pool.submit(run_job, job)] = job
+                    with _interrupts_for_us():
+                        running[pool.submit(run_job, job)] = job
+                if not running:
+                    break
                 done, _ = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
                     job = running.pop(future)
@@ -90,6 +111,15 @@ def _single_threaded() -> Iterator[None]:
                 os.environ[name] = value
 
 
+@contextmanager
+def _interrupts_for_us() -> Iterator[None]:
+    """Processes started inside are never reached by Ctrl-C, which is the parent's to handle."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _start_worker() -> None:
     cv2.setNumThreads(1)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle

@@ -27,11 +27,17 @@ from rgbd_kcf_tracker.evaluation.identity import Pairs
 from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
-from rgbd_kcf_tracker.evaluation.store import slug, write_atomically, write_json
+from rgbd_kcf_tracker.evaluation.store import slug, write_json
 from rgbd_kcf_tracker.evaluation.table import Table
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 PAGE = 'index.html'
 PER_FRAME = 'per_frame.csv'
+REPORT_NAMES = frozenset(
+    {PAGE, PER_FRAME, 'pairs.csv', 'failures.txt', 'report.json', 'tables.md'}
+    | {'results', 'submission', 'tables', 'thumbs', 'truth'}
+)
+"""What a report folder holds, whole or begun."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -27,6 +28,7 @@ def run(
     folder: Path,
     options: RunOptions,
     report: Report = lambda done, name: None,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> list[Failure]:
     """Run every contender on every sequence that it has not run on yet.
 
@@ -36,6 +38,7 @@ def run(
         folder: where results go.
         options: how.
         report: is told of progress, the runs found done at first.
+        stopped: is asked before each run whether to begin no more; those under way are finished.
 
     Returns:
         What failed; everything else is in ``folder``.
@@ -58,10 +61,12 @@ def run(
         cv2.setNumThreads(1)
         try:
             for job in jobs:
+                if stopped():
+                    break
                 failures.extend(run_job(job))
                 report(len(job.contenders), job.sequence.name)
         finally:
             cv2.setNumThreads(threads)
     else:
-        failures.extend(run_parallel(jobs, options.jobs, report))
+        failures.extend(run_parallel(jobs, options.jobs, report, stopped))
     return failures

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import cv2
@@ -152,10 +152,16 @@ class Speed:
         return float(np.percentile(self.searching, 95)) if self.searching else None
 
 
-def measure(contenders: list[Contender], setting: Setting, count: int) -> list[Speed]:
+def measure(
+    contenders: list[Contender],
+    setting: Setting,
+    count: int,
+    stopped: Callable[[], bool] = lambda: False,
+) -> list[Speed]:
     """Time ``count`` frames of one setting, the contenders turn by turn on each frame.
 
-    One thread: OpenCV's own threads are switched off for the time.
+    One thread: OpenCV's own threads are switched off for the time. Asked by ``stopped`` before each
+    frame to end early, it answers with the times it has.
     """
     scene = SpeedScene(setting)
     trackers: list[Tracker] = [c.make() for c in contenders]
@@ -168,6 +174,8 @@ def measure(contenders: list[Contender], setting: Setting, count: int) -> list[S
         for tracker in trackers:
             tracker.start(first, scene.box(0))
         for index in range(1, count):
+            if stopped():
+                break
             frame = scene.frame(index)
             for tracker, speed in zip(trackers, speeds, strict=True):
                 begun = time.perf_counter()

@@ -13,10 +13,8 @@ import csv
 import io
 import json
 import math
-import os
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,8 +24,10 @@ import numpy as np
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings import TrackCsvWriter
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.recordings.results import HEADER
+from rgbd_kcf_tracker.recordings.results import row as track_row
+from rgbd_kcf_tracker.recordings.textfiles import box_or_none
 from rgbd_kcf_tracker.track import Track
 
 TRUTH_HEADER = (
@@ -69,27 +69,6 @@ def slug(name: str) -> str:
     return re.sub(r'[^A-Za-z0-9.=-]+', '_', name).strip('._') or '_'
 
 
-@contextmanager
-def moved_into_place(path: Path) -> Iterator[Path]:
-    """Another name for a file to be written, which gets its own when it is whole."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_atomically(path: Path, data: str | bytes) -> None:
-    """Write a file under another name, then move it into place."""
-    with moved_into_place(path) as temporary:
-        if isinstance(data, str):
-            temporary.write_text(data, encoding='utf-8')
-        else:
-            temporary.write_bytes(data)
-
-
 def write_json(path: Path, value: Any, indent: int | None = None) -> None:
     """JSON with NaN as null."""
     write_atomically(path, json.dumps(_plain(value), indent=indent, allow_nan=False) + '\n')
@@ -112,9 +91,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:
     """One row per frame, as ``rgbd-kcf track --output`` writes them."""
-    with moved_into_place(path) as temporary, TrackCsvWriter(temporary) as writer:
-        for index, (stamp, track) in enumerate(zip(stamps_ns, tracks, strict=True)):
-            writer.write_track(index, stamp, track)
+    pairs = zip(stamps_ns, tracks, strict=True)
+    rows = [track_row(i, stamp, track) for i, (stamp, track) in enumerate(pairs)]
+    write_atomically(path, '\n'.join([','.join(HEADER), *rows]) + '\n')
 
 
 def read_tracks(path: Path) -> Tracks:
@@ -129,8 +108,11 @@ def read_tracks(path: Path) -> Tracks:
         try:
             boxes[index] = [_number(row[k]) for k in ('x', 'y', 'width', 'height')]
             scores[index] = _number(row['score'])
+            box_or_none(*boxes[index])  # half a box is none
         except ValueError:
-            raise DatasetError(f'{path}, line {index + 2}: a cell is no number') from None
+            raise DatasetError(
+                f'{path}, line {index + 2}: a cell is no number, or a box lacks one'
+            ) from None
         states.append(row['state'])
     return Tracks(boxes, tuple(states), scores)
 

@@ -12,8 +12,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.store import slug
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
+from rgbd_kcf_tracker.recordings.images import decode_color_bytes
 
 FRAMES = 8
 COLUMNS = 4
@@ -56,8 +59,9 @@ def strip(
     tiles = []
     for i in choose(indices, interesting):
         path = folder / 'thumbs' / slug(sequence) / f'{i:06d}.jpg'
-        picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
-        if picture is None:
+        try:  # cv2.imread dies of a name that is no UTF-8
+            picture = decode_color_bytes(memoryview(read_file(path, MAX_IMAGE)))
+        except RgbdKcfError:
             continue
         size = (round(picture.shape[1] * ENLARGED), round(picture.shape[0] * ENLARGED))
         image: Picture = np.asarray(cv2.resize(picture, size), np.uint8)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
-from rgbd_kcf_tracker.evaluation.store import write_atomically
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 FORMATS = ('princeton', 'vot')
 

@@ -138,7 +138,11 @@ class ByLook:
         step = max(1, round(frame.width / SEARCH_WIDTH))
         small = np.ascontiguousarray(frame.color[step // 2 :: step, step // 2 :: step])
         posterior = self._appearance.posterior(small)
-        width, height = (max(1, round(side / step)) for side in self._size)
+        # Windows larger than the image show no more of it than all.
+        width, height = (
+            min(max(1, round(side / step)), most)
+            for side, most in zip(self._size, small.shape[1::-1], strict=True)
+        )
         inner = cv2.boxFilter(
             posterior, -1, (width | 1, height | 1), borderType=cv2.BORDER_REPLICATE
         )

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
-from rgbd_kcf_tracker.recordings.containers import JPEG, inspect, sniff
+from rgbd_kcf_tracker.recordings.containers import JPEG, MAX_SIDE, inspect, sniff
 from rgbd_kcf_tracker.recordings.images import (
     COLOR_ENCODINGS,
     DEPTH_ENCODINGS,
@@ -70,7 +70,7 @@ def _look_at_compressed(topic: Topic, msg: Any, by_name: str) -> ImageTopic:
         except ImageError:
             pass
         return ImageTopic(topic.name, 'depth', size, text)
-    head = inspect(data)
+    head = inspect(data, MAX_SIDE**2)  # it is only looked at
     size = head.width, head.height
     if head.channels == 1 and head.bits in (16, 32):
         return ImageTopic(topic.name, 'depth', size, text)

@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.recordings.encoding import (
     encode_compressed_color,
     encode_depth,
 )
-from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, types
+from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter, types
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.track import Track
 
@@ -70,15 +70,19 @@ class BagWriter:
     there, and that ``convert`` mends.
 
     Args:
-        path: the file; missing folders are made.
+        path: the file.
         topics: names of the images.
         tracker: prefix of the tracker's topics.
         depth_encoding: 16UC1 (millimetres) or 32FC1 (metres).
         compression: of the chunks: none, lz4 or zstd.
         annotate: write ``image_annotated/compressed`` with each track, too.
+        overwrite: replace a file that is there.
+
+    Attributes:
+        output: the file.
 
     Raises:
-        RecordingError: where it cannot be written.
+        RecordingError: where it cannot be written, or is there already.
         ParameterError: for an unknown compression or depth encoding.
     """
 
@@ -89,8 +93,9 @@ class BagWriter:
         *,
         tracker: str = '/tracker',
         depth_encoding: str = '16UC1',
-        compression: str = 'none',
+        compression: str = DEFAULT_COMPRESSION,
         annotate: bool = False,
+        overwrite: bool = False,
     ) -> None:
         if depth_encoding not in ('16UC1', '32FC1'):
             raise ParameterError(f'depth encoding is {depth_encoding!r}: choose 16UC1 or 32FC1')
@@ -98,7 +103,8 @@ class BagWriter:
         self._tracker = tracker.rstrip('/')
         self._depth_encoding = depth_encoding
         self._annotate = annotate
-        self._writer = McapWriter(path, compression)
+        self._writer = McapWriter(path, compression, overwrite)
+        self.output = self._writer.output
 
     def write_frame(self, frame: Frame) -> None:
         """Write colour, depth where there is, and CameraInfo where intrinsics are known."""
@@ -141,7 +147,7 @@ class BagWriter:
         self._writer.flush()
 
     def close(self) -> None:
-        """Write the index and close the file."""
+        """Write the index and close the file; see :meth:`McapWriter.close`."""
         self._writer.close()
 
     def __enter__(self) -> BagWriter:
@@ -153,7 +159,7 @@ class BagWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        self._writer.__exit__(kind, error, trace)
 
     def _header(self, frame: Frame) -> Any:
         return make.header(frame.stamp_ns, self.topics.frame_id)

@@ -52,6 +52,7 @@ class BagRecording:
     def __init__(self, path: Path, options: ReadOptions) -> None:
         self.path = path
         self.name = path.resolve().stem if path.is_file() else path.resolve().name
+        self._max_pixels = options.max_pixels
         self.bag = RawBag(path)
         self.warnings: list[str] = list(self.bag.warnings)
         try:
@@ -149,7 +150,8 @@ class BagRecording:
     def _read_color(self, index: int, number: int) -> ColorImage:
         try:
             msg = self.bag.message(self._color, index)
-            return decode_compressed_color(msg) if _compressed(self._color) else decode_color(msg)
+            decode = decode_compressed_color if _compressed(self._color) else decode_color
+            return decode(msg, self._max_pixels)
         except RgbdKcfError as error:
             where = f'{self.path}, frame {number} of {self.topics.color}'
             mend = ' (rgbd-kcf convert writes a bag without what cannot be read)'
@@ -160,7 +162,8 @@ class BagRecording:
         assert self._depth is not None
         try:
             msg = self.bag.message(self._depth, index)
-            return decode_compressed_depth(msg) if _compressed(self._depth) else decode_depth(msg)
+            decode = decode_compressed_depth if _compressed(self._depth) else decode_depth
+            return decode(msg, self._max_pixels)
         except RgbdKcfError as error:
             if isinstance(error, EncodingError):
                 raise ImageError(

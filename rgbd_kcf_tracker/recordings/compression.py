@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.files import open_file
 
 MAX_UNPACKED = 1 << 28
 """Largest chunk or message that is unpacked, in bytes; a few kB of zstd can claim as much."""
@@ -140,7 +141,7 @@ def unpack_file(source: Path, target: Path) -> None:
     import zstandard
 
     try:
-        with source.open('rb') as packed, target.open('wb') as file:
+        with open_file(source) as packed, target.open('wb') as file:
             reader: Any = zstandard.ZstdDecompressor(max_window_size=_WINDOW).stream_reader(packed)
             try:
                 while part := reader.read(1 << 22):

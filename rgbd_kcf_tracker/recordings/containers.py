@@ -17,8 +17,12 @@ from rgbd_kcf_tracker.errors import ImageError
 
 PNG, JPEG, TIFF = 'PNG', 'JPEG', 'TIFF'
 
-MAX_PIXELS = 1 << 26
-"""Largest image that is read: 67 million pixels, twice an 8K picture."""
+MAX_PIXELS = 1 << 24
+"""Largest image that is read unless another limit is given: 16.8 million pixels.
+
+Azure Kinect's 4096x3072 is the largest colour image of an RGB-D camera. A picture of four times as
+many pixels takes seconds to unpack, from a message of a few kB.
+"""
 MAX_SIDE = 1 << 16
 
 _PNG_SIGNATURE = b'\x89PNG\r\n\x1a\n'
@@ -54,7 +58,7 @@ def sniff(data: memoryview) -> str | None:
     return None
 
 
-def check_size(width: int, height: int, what: str) -> None:
+def check_size(width: int, height: int, what: str, max_pixels: int = MAX_PIXELS) -> None:
     """Refuse an image without pixels or with unbelievably many.
 
     Raises:
@@ -62,13 +66,14 @@ def check_size(width: int, height: int, what: str) -> None:
     """
     if width <= 0 or height <= 0:
         raise ImageError(f'{what} is {width}x{height}: it has no pixels')
-    if width > MAX_SIDE or height > MAX_SIDE or width * height > MAX_PIXELS:
+    if width > MAX_SIDE or height > MAX_SIDE or width * height > max_pixels:
         raise ImageError(
-            f'{what} claims {width}x{height} pixels: more than {MAX_PIXELS} are not read'
+            f'{what} claims {width}x{height} pixels: more than {max_pixels} are not read '
+            '(max_pixels sets the limit)'
         )
 
 
-def inspect(data: memoryview) -> Container:
+def inspect(data: memoryview, max_pixels: int = MAX_PIXELS) -> Container:
     """Read and check the head of a compressed image.
 
     Raises:
@@ -81,10 +86,10 @@ def inspect(data: memoryview) -> Container:
             f'(it starts with {bytes(data[:8]).hex() or "nothing"})'
         )
     try:
-        container, unpacked, ratio = {PNG: _png, JPEG: _jpeg, TIFF: _tiff}[kind](data)
+        container, unpacked, ratio = {PNG: _png, JPEG: _jpeg, TIFF: _tiff}[kind](data, max_pixels)
     except (struct.error, IndexError, OverflowError):
         raise ImageError(f'{kind} image of {len(data)} bytes is cut off in its head') from None
-    check_size(container.width, container.height, f'{kind} image')
+    check_size(container.width, container.height, f'{kind} image', max_pixels)
     if unpacked > ratio * len(data) + _SLACK:
         raise ImageError(
             f'{kind} image of {len(data)} bytes claims {container.width}x{container.height} '
@@ -93,7 +98,7 @@ def inspect(data: memoryview) -> Container:
     return container
 
 
-def _png(data: memoryview) -> tuple[Container, int, int]:
+def _png(data: memoryview, max_pixels: int) -> tuple[Container, int, int]:
     length, kind, width, height, bits, color = struct.unpack_from('>I4sIIBB', data, 8)
     if kind != b'IHDR' or length != 13 or color not in _PNG_CHANNELS:
         raise ImageError('PNG image is damaged in its head')
@@ -117,7 +122,7 @@ def _walk_chunks(data: memoryview) -> None:
     raise ImageError(f'PNG image of {len(data)} bytes is cut off')
 
 
-def _jpeg(data: memoryview) -> tuple[Container, int, int]:
+def _jpeg(data: memoryview, max_pixels: int) -> tuple[Container, int, int]:
     position = 2
     while True:
         while data[position] != 0xFF:
@@ -143,7 +148,7 @@ def _jpeg(data: memoryview) -> tuple[Container, int, int]:
 _TIFF_TYPES = {1: 'B', 3: 'H', 4: 'I'}
 
 
-def _tiff(data: memoryview) -> tuple[Container, int, int]:
+def _tiff(data: memoryview, max_pixels: int) -> tuple[Container, int, int]:
     order = '<' if data[0] == ord('I') else '>'
     (offset,) = struct.unpack_from(order + 'I', data, 4)
     (count,) = struct.unpack_from(order + 'H', data, offset)
@@ -164,7 +169,9 @@ def _tiff(data: memoryview) -> tuple[Container, int, int]:
     for side in (tags.get(322, 1), tags.get(323, 1)):
         if side > MAX_SIDE:
             raise ImageError(f'TIFF image claims a tile of {side} pixels')
-    check_size(max(tags.get(322, 1), 1), max(tags.get(323, 1), 1), 'tile of a TIFF image')
+    check_size(
+        max(tags.get(322, 1), 1), max(tags.get(323, 1), 1), 'tile of a TIFF image', max_pixels
+    )
     if channels > 4 or bits > 64:
         raise ImageError(f'TIFF image claims {channels} channels of {bits} bits')
     stored = width * height * channels * bits // 8

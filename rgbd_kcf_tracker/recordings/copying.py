@@ -13,10 +13,13 @@ from typing import Any, TypeVar
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.bag_writer import GENERIC, BagWriter, CameraTopics
 from rgbd_kcf_tracker.recordings.bags import BagRecording
-from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, definition_text
+from rgbd_kcf_tracker.recordings.mcap_writer import (
+    DEFAULT_COMPRESSION,
+    McapWriter,
+    definition_text,
+)
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import Recording
-from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
 from rgbd_kcf_tracker.recordings.storage import Definition
 from rgbd_kcf_tracker.recordings.topics import base_name
 
@@ -55,8 +58,9 @@ def write_recording(
     path: str | os.PathLike[str],
     *,
     topics: CameraTopics = GENERIC,
-    compression: str = 'none',
+    compression: str = DEFAULT_COMPRESSION,
     progress: Progress[Any] = _no_progress,
+    overwrite: bool = False,
 ) -> int:
     """Decode all frames of a recording and write them, with its ground truth, as mcap.
 
@@ -68,7 +72,7 @@ def write_recording(
     """
     truth, body = recording.groundtruth, recording.groundtruth_body
     count = 0
-    with BagWriter(path, topics, compression=compression) as writer:
+    with BagWriter(path, topics, compression=compression, overwrite=overwrite) as writer:
         for frame in progress(recording.frames(), len(recording)):
             writer.write_frame(frame)
             if truth is not None and count < len(truth):
@@ -82,8 +86,9 @@ def copy_bag(
     bag: RawBag,
     path: str | os.PathLike[str],
     *,
-    compression: str = 'none',
+    compression: str = DEFAULT_COMPRESSION,
     progress: Progress[Any] = _no_progress,
+    overwrite: bool = False,
 ) -> tuple[int, list[str]]:
     """Copy all messages of a bag into an mcap file, in the order of recording.
 
@@ -96,11 +101,15 @@ def copy_bag(
         RecordingError: where the bag cannot be read on, or the file not be written.
     """
     warnings: list[str] = []
-    translate = Ros1Translator(bag) if bag.ros1 else _Passer(bag)
+    translate: Any = _Passer(bag)
+    if bag.ros1:  # brings all of rosbags
+        from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
+
+        translate = Ros1Translator(bag)
     total = sum(len(t) for t in bag.topics.values())
     count = 0
     refused: set[str] = set()
-    with McapWriter(path, compression) as writer:
+    with McapWriter(path, compression, overwrite) as writer:
         for topic, index in progress(bag.in_order(), total):
             if topic.type in refused:
                 continue

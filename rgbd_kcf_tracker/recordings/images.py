@@ -26,6 +26,7 @@ from rgbd_kcf_tracker.errors import ImageError
 from rgbd_kcf_tracker.recordings import rvl
 from rgbd_kcf_tracker.recordings.containers import (
     JPEG,
+    MAX_PIXELS,
     PNG,
     TIFF,
     Container,
@@ -65,11 +66,12 @@ class EncodingError(ImageError):
     """An image is sound but of a kind that is not read: the whole stream will be."""
 
 
-def decode_color(msg: Any) -> ColorImage:
+def decode_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
     """The picture of a ``sensor_msgs/Image``.
 
     Args:
         msg: with ``height, width, encoding, step, data``; encodings: :data:`COLOR_ENCODINGS`.
+        max_pixels: of the largest image that is read.
 
     Returns:
         ``(H, W, 3)`` uint8, BGR. It may share the memory of ``msg.data`` and be read-only.
@@ -81,7 +83,7 @@ def decode_color(msg: Any) -> ColorImage:
     if encoding not in _COLOR_ENCODINGS:
         raise EncodingError(_unknown_encoding('colour', encoding, _COLOR_ENCODINGS))
     channels, conversion = _COLOR_ENCODINGS[encoding]
-    rows = _rows(msg, channels)
+    rows = _rows(msg, channels, max_pixels)
     height, width = int(msg.height), int(msg.width)
     if channels == 2 and width % 2:
         raise ImageError(f'{encoding} image is {width} pixels wide: it must be an even number')
@@ -91,12 +93,13 @@ def decode_color(msg: Any) -> ColorImage:
     return cast(ColorImage, cv2.cvtColor(pixels, conversion))
 
 
-def decode_depth(msg: Any) -> DepthImage:
+def decode_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
     """The depth of a ``sensor_msgs/Image`` (REP-118: 16UC1 millimetres or 32FC1 metres).
 
     Args:
         msg: with ``height, width, encoding, step, is_bigendian, data``; encodings:
             :data:`DEPTH_ENCODINGS`.
+        max_pixels: of the largest image that is read.
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading; memory of its own.
@@ -108,16 +111,17 @@ def decode_depth(msg: Any) -> DepthImage:
     if encoding not in _DEPTH_ENCODINGS:
         raise EncodingError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
     kind = _DEPTH_ENCODINGS[encoding]
-    rows = np.ascontiguousarray(_rows(msg, int(kind[1])))
+    rows = np.ascontiguousarray(_rows(msg, int(kind[1]), max_pixels))
     values = rows.view(('>' if msg.is_bigendian else '<') + kind)
     return metres_from_mm(values) if kind == 'u2' else metres_from_float(values)
 
 
-def decode_compressed_color(msg: Any) -> ColorImage:
+def decode_compressed_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
     """The picture of a ``sensor_msgs/CompressedImage``: JPEG, PNG or TIFF.
 
     Args:
         msg: with ``format, data``.
+        max_pixels: of the largest image that is read.
 
     Returns:
         ``(H, W, 3)`` uint8, BGR.
@@ -125,10 +129,10 @@ def decode_compressed_color(msg: Any) -> ColorImage:
     Raises:
         ImageError: for data that is none of these, is cut off, or claims an unbelievable size.
     """
-    return decode_color_bytes(as_bytes(msg.data))
+    return decode_color_bytes(as_bytes(msg.data), max_pixels)
 
 
-def decode_compressed_depth(msg: Any) -> DepthImage:
+def decode_compressed_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
     """The depth of a ``sensor_msgs/CompressedImage``.
 
     Understood are compressed_depth_image_transport's PNG and RVL behind its 12-byte header, for
@@ -137,6 +141,7 @@ def decode_compressed_depth(msg: Any) -> DepthImage:
 
     Args:
         msg: with ``format, data``.
+        max_pixels: of the largest image that is read.
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading.
@@ -144,12 +149,12 @@ def decode_compressed_depth(msg: Any) -> DepthImage:
     Raises:
         ImageError: for data that is none of these, is cut off, or claims an unbelievable size.
     """
-    return decode_depth_bytes(as_bytes(msg.data), str(msg.format))
+    return decode_depth_bytes(as_bytes(msg.data), str(msg.format), max_pixels)
 
 
-def decode_color_bytes(data: memoryview) -> ColorImage:
+def decode_color_bytes(data: memoryview, max_pixels: int = MAX_PIXELS) -> ColorImage:
     """The picture in a JPEG, PNG or TIFF file's bytes; see :func:`decode_compressed_color`."""
-    container = inspect(data)
+    container = inspect(data, max_pixels)
     if container.bits != 8:
         raise EncodingError(
             f'colour {container.name} has {container.bits} bits per channel: 8 expected '
@@ -159,26 +164,29 @@ def decode_color_bytes(data: memoryview) -> ColorImage:
     return cast(ColorImage, _imdecode(data, flags, container))
 
 
-def decode_depth_bytes(data: memoryview, text: str = '') -> DepthImage:
+def decode_depth_bytes(
+    data: memoryview, text: str = '', max_pixels: int = MAX_PIXELS
+) -> DepthImage:
     """The depth in compressed bytes; see :func:`decode_compressed_depth`.
 
     Args:
         data: all bytes of the message or file.
         text: the message's ``format``.
+        max_pixels: of the largest image that is read.
     """
     kind = sniff(data)
     if kind == JPEG:
         raise EncodingError('depth is JPEG, which spoils it: record compressedDepth or raw depth')
     if kind in (PNG, TIFF):
-        return _bare_depth(data)
+        return _bare_depth(data, max_pixels)
     if len(data) <= _COMPRESSED_DEPTH_HEADER.size:
         raise ImageError(f'compressed depth has only {len(data)} bytes: the message is cut off')
     _, a, b = _COMPRESSED_DEPTH_HEADER.unpack_from(data)
     body = data[_COMPRESSED_DEPTH_HEADER.size :]
     if sniff(body) == PNG:
-        values = _decode_png16(body)
+        values = _decode_png16(body, max_pixels)
     elif 'rvl' in text.lower() or 'png' not in text.lower():
-        values = rvl.decode(body)
+        values = rvl.decode(body, max_pixels)
     else:
         raise ImageError(f'compressed depth {text!r} holds no PNG: the message is damaged')
     if pixel_format(text) != '32FC1':
@@ -223,10 +231,10 @@ def as_bytes(data: Any) -> memoryview:
     return view if view.format == 'B' and view.ndim == 1 and view.contiguous else view.cast('B')
 
 
-def _rows(msg: Any, bytes_per_pixel: int) -> npt.NDArray[np.uint8]:
+def _rows(msg: Any, bytes_per_pixel: int, max_pixels: int) -> npt.NDArray[np.uint8]:
     """``(H, W * bytes_per_pixel)`` uint8 view of the pixels, without the padding of the rows."""
     height, width, step = int(msg.height), int(msg.width), int(msg.step)
-    check_size(width, height, f'{msg.encoding} image')
+    check_size(width, height, f'{msg.encoding} image', max_pixels)
     needed = width * bytes_per_pixel
     if step < needed:
         raise ImageError(
@@ -244,8 +252,8 @@ def _rows(msg: Any, bytes_per_pixel: int) -> npt.NDArray[np.uint8]:
     return np.lib.stride_tricks.as_strided(flat, (height, needed), (step, 1))
 
 
-def _bare_depth(data: memoryview) -> DepthImage:
-    container = inspect(data)
+def _bare_depth(data: memoryview, max_pixels: int) -> DepthImage:
+    container = inspect(data, max_pixels)
     if container.channels != 1 or container.bits not in (16, 32):
         raise EncodingError(
             f'depth {container.name} has {container.channels} channels of {container.bits} bits: '
@@ -259,8 +267,8 @@ def _bare_depth(data: memoryview) -> DepthImage:
     raise EncodingError(f'depth {container.name} holds {values.dtype}: uint16 or float32 expected')
 
 
-def _decode_png16(data: memoryview) -> npt.NDArray[np.uint16]:
-    container = inspect(data)
+def _decode_png16(data: memoryview, max_pixels: int) -> npt.NDArray[np.uint16]:
+    container = inspect(data, max_pixels)
     if container.channels != 1 or container.bits != 16:
         raise EncodingError(
             f'compressed depth PNG has {container.channels} channels of {container.bits} bits: '

@@ -22,6 +22,7 @@ from mcap.records import Channel, Schema
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import Unpacker, unpack
+from rgbd_kcf_tracker.recordings.files import open_file
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -36,7 +37,7 @@ class _File:
     """Bytes of a file by position, without a buffer of its own."""
 
     def __init__(self, path: Path) -> None:
-        self._file = path.open('rb', buffering=0)
+        self._file = open_file(path)
         self.size = os.fstat(self._file.fileno()).st_size
 
     def read(self, at: int, length: int) -> bytes:
@@ -77,10 +78,7 @@ class McapStorage:
         # Place of a packed chunk: method, place of its data, their length, unpacked length, CRC.
         self._chunks: dict[int, tuple[str, int, int, int, int]] = {}
         self._cache: OrderedDict[int, bytes] = OrderedDict()
-        try:
-            self._file = _File(path)
-        except OSError as error:
-            raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+        self._file = _File(path)
         magic = self._file.read(0, len(MAGIC))
         if magic != MAGIC:
             self._file.close()

@@ -5,19 +5,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from pathlib import Path
 from types import TracebackType
 from typing import Any, cast
 
 from mcap.writer import CompressionType, Writer
 
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.recordings.outputs import OutputFile, cannot_write
 from rgbd_kcf_tracker.recordings.rawbag import typestore
-from rgbd_kcf_tracker.recordings.results import cannot_write, prepare_output
 from rgbd_kcf_tracker.recordings.storage import Definition
 
 COMPRESSIONS = ('none', 'lz4', 'zstd')
+DEFAULT_COMPRESSION = 'zstd'
 
 # Large enough for the index to stay small, small enough that a kill loses little: an image fills a
 # chunk by itself.
@@ -28,23 +29,34 @@ class McapWriter:
     """Writes messages as they come.
 
     Args:
-        path: the file; missing folders are made.
+        path: the file.
         compression: of the chunks: none, lz4 or zstd.
+        overwrite: replace a file that is there.
+
+    Attributes:
+        output: the file.
 
     Raises:
-        RecordingError: where it cannot be written.
+        RecordingError: where it cannot be written, or is there already.
         ParameterError: for another compression.
     """
 
-    def __init__(self, path: str | os.PathLike[str], compression: str = 'none') -> None:
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        compression: str = DEFAULT_COMPRESSION,
+        overwrite: bool = False,
+    ) -> None:
         if compression not in COMPRESSIONS:
             raise ParameterError(
                 f'compression is {compression!r}: choose one of {", ".join(COMPRESSIONS)}'
             )
-        self.path = Path(path)
-        prepare_output(self.path)
+        self.output = OutputFile(path, overwrite)
+        self.path = self.output.path
+        self._file = self.output.file
+        self._channels: dict[str, int] = {}
+        self._counts: dict[str, int] = {}
         try:
-            self._file = self.path.open('wb')
             self._writer = Writer(
                 cast(Any, self._file),
                 chunk_size=_CHUNK,
@@ -53,9 +65,8 @@ class McapWriter:
             self._writer.start(profile='ros2', library='rgbd_kcf_tracker')
             self._file.flush()
         except OSError as error:
+            self.output.end(whole=False, anything=False)
             raise RecordingError(cannot_write(self.path, error)) from None
-        self._channels: dict[str, int] = {}
-        self._counts: dict[str, int] = {}
 
     def write(self, topic: str, message: Any, log_ns: int) -> None:
         """Write a message of rosbags' ROS 2 typestore (:func:`types`).
@@ -109,8 +120,11 @@ class McapWriter:
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
 
-    def close(self) -> None:
-        """Write the index and close the file.
+    def close(self, whole: bool = True) -> None:
+        """Write the index and close the file; one without a message is removed.
+
+        Args:
+            whole: all messages are written: only then does it replace another.
 
         Raises:
             RecordingError: where it cannot be written.
@@ -119,9 +133,11 @@ class McapWriter:
             return
         try:
             cast(Any, self._writer).finish()
-            self._file.close()
+            self._file.flush()
         except OSError as error:
+            self.output.end(whole=False, anything=bool(self._counts))
             raise RecordingError(cannot_write(self.path, error)) from None
+        self.output.end(whole=whole, anything=bool(self._counts))
 
     def __enter__(self) -> McapWriter:
         return self
@@ -132,7 +148,11 @@ class McapWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        if error is None:
+            self.close()
+        else:
+            with contextlib.suppress(RecordingError):  # the error before says more
+                self.close(whole=False)
 
     def _register(self, topic: str, kind: str, definition: Definition | None) -> int:
         if definition is None or definition.encoding == 'ros1msg':

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.results import cannot_write, open_for_writing
+from rgbd_kcf_tracker.recordings.outputs import OutputFile
 from rgbd_kcf_tracker.recordings.textfiles import read_lines
 from rgbd_kcf_tracker.track import Track
 
@@ -181,15 +181,15 @@ class MotWriter:
     A run that is interrupted leaves all frames up to then.
 
     Args:
-        path: the file. Missing folders are made.
+        path: the file.
+        overwrite: replace a file that is there.
 
     Raises:
-        RecordingError: where it cannot be written.
+        RecordingError: where it cannot be written, or is there already.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = Path(path)
-        self._file = open_for_writing(self.path)
+    def __init__(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
+        self.output = OutputFile(path, overwrite)
 
     def write_tracks(self, number: int, tracks: Mapping[int, Track]) -> None:
         """Write the boxes of frame ``number``, from 0; targets without a box have no line.
@@ -197,32 +197,18 @@ class MotWriter:
         Raises:
             RecordingError: where it cannot be written.
         """
-        lines = []
-        for who, track in sorted(tracks.items()):
-            if track.box is None:
-                continue
-            score = _UNKNOWN if math.isnan(track.score) else track.score
-            lines.append(_format(number, who, track.box.as_tuple(), score, track.position))
-        self._write(lines)
+        self.output.write(''.join(_track_lines(number, tracks)).encode())
 
-    def write_sightings(self, sightings: Sightings) -> None:
-        """Write rows as they are, without their visible shares.
+    def close(self, whole: bool = True) -> None:
+        """Close the file. One without a line stays: nobody was seen.
+
+        Args:
+            whole: all frames are written: only then does it replace another.
 
         Raises:
             RecordingError: where it cannot be written.
         """
-        s = sightings
-        self._write(
-            _format(int(f), int(i), b, c, None if math.isnan(p[0]) else p)
-            for f, i, b, c, p in zip(
-                s.frames, s.ids, s.boxes.tolist(), s.scores.tolist(), s.positions.tolist(),
-                strict=True,
-            )
-        )  # fmt: skip
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
+        self.output.end(whole=whole, anything=True)
 
     def __enter__(self) -> MotWriter:
         return self
@@ -233,14 +219,26 @@ class MotWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        self.close(whole=error is None)
 
-    def _write(self, lines: Iterable[str]) -> None:
-        try:
-            self._file.writelines(lines)
-            self._file.flush()
-        except OSError as error:
-            raise RecordingError(cannot_write(self.path, error)) from None
+
+def mot_text(sightings: Sightings) -> str:
+    """Rows as MOT Challenge text, without their visible shares."""
+    s = sightings
+    return ''.join(
+        _format(int(f), int(i), b, c, None if math.isnan(p[0]) else p)
+        for f, i, b, c, p in zip(
+            s.frames, s.ids, s.boxes.tolist(), s.scores.tolist(), s.positions.tolist(),
+            strict=True,
+        )
+    )  # fmt: skip
+
+
+def _track_lines(number: int, tracks: Mapping[int, Track]) -> Iterator[str]:
+    for who, track in sorted(tracks.items()):
+        if track.box is not None:
+            score = _UNKNOWN if math.isnan(track.score) else track.score
+            yield _format(number, who, track.box.as_tuple(), score, track.position)
 
 
 def _format(

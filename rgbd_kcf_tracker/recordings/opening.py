@@ -9,6 +9,7 @@ import os
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.files import require_source
 from rgbd_kcf_tracker.recordings.recording import ReadOptions, Recording, RecordingInfo
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 
@@ -25,8 +26,7 @@ def open_recording(path: str | os.PathLike[str], options: ReadOptions | None = N
     """
     options = ReadOptions() if options is None else options
     where = Path(path)
-    if not where.exists():
-        raise RecordingError(f'{where} does not exist')
+    require_source(where)
     if where.is_dir() and is_sequence_folder(where):
         return SequenceFolder(where, options)
     # The bag formats bring libraries that a sequence folder does without.
@@ -43,11 +43,12 @@ def describe_recording(
     Raises:
         RecordingError: where it is no recording or cannot be read.
     """
+    require_source(path)
     try:
         with open_recording(path, options) as recording:
             return recording.info()
     except RecordingError as error:
-        if not Path(path).exists() or is_sequence_folder(Path(path)):
+        if is_sequence_folder(Path(path)):
             raise
         from rgbd_kcf_tracker.recordings.bags import describe_bag
 

@@ -121,7 +121,8 @@ def _label(
 def _sizes(image: npt.NDArray[np.uint8]) -> tuple[float, int]:
     """Scale of words and thickness of lines that go with a picture's size."""
     scale = max(0.42, min(image.shape[0] / 900, image.shape[1] / 1100))
-    return scale, max(1, round(3.2 * scale))
+    # Video keeps one colour for two by two pixels: a thinner line has none of its own there.
+    return scale, max(3, round(3.2 * scale))
 
 
 def _words(track: Track) -> str:

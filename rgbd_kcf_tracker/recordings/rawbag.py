@@ -15,6 +15,7 @@ import yaml
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import unpack, unpack_file
+from rgbd_kcf_tracker.recordings.files import cannot_read, open_file, read_text
 from rgbd_kcf_tracker.recordings.mcap_storage import McapStorage
 from rgbd_kcf_tracker.recordings.ros1_storage import Ros1Storage
 from rgbd_kcf_tracker.recordings.sqlite_storage import SqliteStorage
@@ -141,11 +142,11 @@ class RawBag:
             mode = str(metadata.get('compression_mode') or '').lower()
             if mode == 'message':
                 self._message_method = str(metadata.get('compression_format') or 'zstd')
-        present = {
-            p.name: p
-            for p in sorted(self.path.iterdir(), key=lambda p: natural_key(p.name))
-            if p.name.removesuffix('.zstd').endswith(_SUFFIXES)
-        }
+        try:
+            inside = sorted(self.path.iterdir(), key=lambda p: natural_key(p.name))
+        except OSError as error:
+            raise RecordingError(cannot_read(self.path, error)) from None
+        present = {p.name: p for p in inside if p.name.removesuffix('.zstd').endswith(_SUFFIXES)}
         missing = [name for name in names if name not in present]
         if missing:
             self.warnings.append(
@@ -176,9 +177,9 @@ class RawBag:
         if not path.exists():
             return {}
         try:
-            content = yaml.safe_load(path.read_text(encoding='utf-8'))
+            content = yaml.safe_load(read_text(path))
             return cast('dict[str, Any]', dict(content['rosbag2_bagfile_information']))
-        except (OSError, ValueError, TypeError, KeyError, yaml.YAMLError):
+        except (RecordingError, RecursionError, ValueError, TypeError, KeyError, yaml.YAMLError):
             self.warnings.append(f'{path} cannot be understood: it is left out')
             return {}
 
@@ -203,11 +204,8 @@ def _by_time(number: int, topic: Topic) -> Iterator[tuple[int, tuple[int, ...], 
 
 def _open_storage(path: Path) -> Storage:
     """The storage for a file, by its first bytes; its name is only asked for the message."""
-    try:
-        with path.open('rb') as file:
-            head = file.read(16)
-    except OSError as error:
-        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+    with open_file(path) as file:
+        head = file.read(16)
     if not head:
         raise RecordingError(f'{path} is empty: nothing was recorded')
     if head.startswith(b'\x89MCAP'):

@@ -14,6 +14,9 @@ from typing import Protocol
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
+
+MIN_FPS, MAX_FPS = 1e-3, 1e6
 
 NO_DEPTH = 'none'
 """As ``depth_topic``: read colour alone."""
@@ -32,9 +35,11 @@ class ReadOptions:
             pair is as near as that (single shots, slow cameras).
         fps: frames per second of a sequence folder without ``timestamps.txt``.
         intrinsics: used instead of the recording's own.
+        max_pixels: of the largest image that is read.
 
     Raises:
-        ParameterError: for a negative tolerance or a rate that is not above 0.
+        ParameterError: for a negative tolerance, a rate out of its range, or a limit that is not
+            above 0.
     """
 
     color_topic: str | None = None
@@ -43,12 +48,17 @@ class ReadOptions:
     tolerance_s: float | None = None
     fps: float = 30.0
     intrinsics: Intrinsics | None = None
+    max_pixels: int = MAX_PIXELS
 
     def __post_init__(self) -> None:
-        if not 0 < self.fps <= 1e6:
-            raise ParameterError(f'fps is {self.fps:g}: it must be above 0')
+        if not MIN_FPS <= self.fps <= MAX_FPS:
+            raise ParameterError(
+                f'fps is {self.fps:g}: it must be between {MIN_FPS:g} and {MAX_FPS:g}'
+            )
         if self.tolerance_s is not None and not 0 <= self.tolerance_s <= 3600:
             raise ParameterError(f'tolerance is {self.tolerance_s:g} s: it must be 0 or more')
+        if self.max_pixels < 1:
+            raise ParameterError(f'max_pixels is {self.max_pixels}: it must be above 0')
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,10 @@ import math
 import os
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from types import TracebackType
-from typing import TextIO
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.outputs import OutputFile, cannot_write
 from rgbd_kcf_tracker.track import Track
 
 HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
@@ -36,18 +35,26 @@ class TrackCsvWriter:
     where there is no box. A run that is interrupted leaves all rows up to then.
 
     Args:
-        path: the file; ``-`` for standard output. Missing folders are made.
+        path: the file; ``-`` for standard output.
+        overwrite: replace a file that is there.
+
+    Attributes:
+        output: the file; None for standard output.
 
     Raises:
-        RecordingError: where it cannot be written.
+        RecordingError: where it cannot be written, or is there already.
     """
 
     _header = ','.join(HEADER)
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path = os.fspath(path)
-        self._file: TextIO = sys.stdout if self.path == '-' else open_for_writing(Path(path))
-        self._write(self._header)
+    def __init__(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
+        self.output = None if os.fspath(path) == '-' else OutputFile(path, overwrite)
+        self._rows = 0
+        try:
+            self._write(self._header)
+        except BaseException:
+            self.close(whole=False)
+            raise
 
     def write_track(self, number: int, stamp_ns: int, track: Track) -> None:
         """Write the row of frame ``number``.
@@ -56,11 +63,19 @@ class TrackCsvWriter:
             RecordingError: where it cannot be written.
         """
         self._write(row(number, stamp_ns, track))
+        self._rows += 1
 
-    def close(self) -> None:
-        """Close the file."""
-        if self._file is not sys.stdout:
-            self._file.close()
+    def close(self, whole: bool = True) -> None:
+        """Close the file; one without a row is removed.
+
+        Args:
+            whole: all rows are written: only then does it replace another.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+        if self.output is not None:
+            self.output.end(whole=whole, anything=self._rows > 0)
 
     def __enter__(self) -> TrackCsvWriter:
         return self
@@ -71,16 +86,19 @@ class TrackCsvWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        self.close(whole=error is None)
 
     def _write(self, line: str) -> None:
+        if self.output is not None:
+            self.output.write(line.encode() + b'\n')
+            return
         try:
-            self._file.write(line + '\n')
-            self._file.flush()
+            sys.stdout.write(line + '\n')
+            sys.stdout.flush()
         except BrokenPipeError:
             raise
         except OSError as error:
-            raise RecordingError(cannot_write(self.path, error)) from None
+            raise RecordingError(cannot_write('standard output', error)) from None
 
 
 class TracksCsvWriter(TrackCsvWriter):
@@ -96,35 +114,4 @@ class TracksCsvWriter(TrackCsvWriter):
         """
         for who, track in sorted(tracks.items()):
             self._write(f'{who},{row(number, stamp_ns, track)}')
-
-
-def open_for_writing(path: Path) -> TextIO:
-    """A text file to write, its folders made where they are missing.
-
-    Raises:
-        RecordingError: where it cannot be written.
-    """
-    prepare_output(path)
-    try:
-        return path.open('w', encoding='utf-8', newline='\n')
-    except OSError as error:
-        raise RecordingError(cannot_write(path, error)) from None
-
-
-def prepare_output(path: Path) -> None:
-    """Make the folder that ``path`` shall lie in.
-
-    Raises:
-        RecordingError: where that cannot be, or ``path`` is a folder itself.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RecordingError(cannot_write(path, error)) from None
-    if path.is_dir():
-        raise RecordingError(f'{path} is a folder: give the name of a file')
-
-
-def cannot_write(path: object, error: OSError) -> str:
-    """The message for a failed write."""
-    return f'{path} cannot be written: {error.strerror or error}'
+            self._rows += 1

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import unpack
+from rgbd_kcf_tracker.recordings.files import open_file
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where, ros2_type
 
 MAGIC = b'#ROSBAG V2.0\n'
@@ -46,10 +47,7 @@ class Ros1Storage:
         # Place of a packed chunk's data: method, their length, unpacked length.
         self._chunks: dict[int, tuple[str, int, int]] = {}
         self._cache: OrderedDict[int, bytes] = OrderedDict()
-        try:
-            self._file = path.open('rb', buffering=0)
-        except OSError as error:
-            raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+        self._file = open_file(path)
         self._size = os.fstat(self._file.fileno()).st_size
         magic = self._at(0, len(MAGIC))
         if magic != MAGIC:

@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ImageError
-from rgbd_kcf_tracker.recordings.containers import check_size
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, check_size
 
 _SIZE = struct.Struct('<II')
 
 
-def decode(data: memoryview) -> npt.NDArray[np.uint16]:
+def decode(data: memoryview, max_pixels: int = MAX_PIXELS) -> npt.NDArray[np.uint16]:
     """``(H, W)`` uint16 of an RVL stream with its size in front.
 
     Raises:
@@ -32,7 +32,7 @@ def decode(data: memoryview) -> npt.NDArray[np.uint16]:
     if len(data) < _SIZE.size:
         raise ImageError('RVL depth is cut off in its head')
     width, height = _SIZE.unpack_from(data)
-    check_size(width, height, 'RVL depth image')
+    check_size(width, height, 'RVL depth image', max_pixels)
     pixels = width * height
     numbers = _unpack(data[_SIZE.size :])
     deltas = np.zeros(pixels, np.int32)

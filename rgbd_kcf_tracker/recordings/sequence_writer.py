@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Mapping
-from pathlib import Path
+from io import FileIO
 from types import TracebackType
-from typing import Any, Protocol, TextIO
+from typing import Any, Protocol
 
 import cv2
 import numpy.typing as npt
@@ -19,11 +20,25 @@ from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.encoding import millimetres
-from rgbd_kcf_tracker.recordings.results import cannot_write, open_for_writing
+from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, Sightings, mot_text
+from rgbd_kcf_tracker.recordings.outputs import OutputFolder, cannot_write
 from rgbd_kcf_tracker.recordings.textfiles import format_box
 
-CLEARLY_VISIBLE = 0.4
-"""Below this share of a person, ``mot.txt`` marks the box as neither hit nor miss."""
+# At the end of the name of an image that is being written.
+_PART = '.part'
+_FILES = (
+    'rgb',
+    'depth',
+    'intrinsics.json',
+    'timestamps.txt',
+    'groundtruth.txt',
+    'groundtruth_body.txt',
+    'visible.txt',
+    'mot.txt',
+    'groundtruth_*.txt',
+    'body_*.txt',
+    'visible_*.txt',
+)
 
 
 class PersonTruth(Protocol):
@@ -53,30 +68,35 @@ class PersonTruth(Protocol):
 class SequenceWriter:
     """Writes ``rgb/``, ``depth/`` (16-bit PNG, millimetres) and the text files beside them.
 
-    Lines are written with their images, so an interrupted run leaves a sequence that can be read.
+    Lines are written with their images, so a run that is interrupted or killed leaves a sequence
+    that can be read; one that was to replace another leaves it beside that.
 
     Args:
-        folder: is made; it may be there, but must not hold images yet.
+        folder: is made; it may be there, but must be empty.
         color_format: 'png', or 'jpg' where size matters more than the last bit.
+        overwrite: replace a sequence that is there.
+
+    Attributes:
+        output: the folder.
 
     Raises:
-        RecordingError: where it cannot be written, or holds images already.
+        RecordingError: where it cannot be written, or holds something already.
         ParameterError: for another format.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], color_format: str = 'png') -> None:
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        color_format: str = 'png',
+        overwrite: bool = False,
+    ) -> None:
         if color_format not in ('png', 'jpg'):
             raise ParameterError(f'colour format is {color_format!r}: choose png or jpg')
-        self.folder = Path(folder)
+        self.output = OutputFolder(folder, _FILES, overwrite)
         self._suffix = color_format
-        self._files: dict[str, TextIO] = {}
+        self._files: dict[str, FileIO] = {}
         self._count = 0
-        try:
-            (self.folder / 'rgb').mkdir(parents=True, exist_ok=True)
-            if any((self.folder / 'rgb').iterdir()):
-                raise RecordingError(f'{self.folder} holds a sequence already: give another folder')
-        except OSError as error:
-            raise RecordingError(cannot_write(self.folder, error)) from None
+        self._make('rgb')
 
     def write(
         self,
@@ -84,69 +104,67 @@ class SequenceWriter:
         visible: Box | None = None,
         body: Box | None = None,
         visible_fraction: float | None = None,
+        people: Mapping[int, PersonTruth] | None = None,
     ) -> None:
         """Write a frame and what is true of it.
+
+        A person ``7`` gets a line in ``groundtruth_7.txt``, ``body_7.txt`` and ``visible_7.txt``
+        (visible share, distance in millimetres); who shows gets one in ``mot.txt``, MOT Challenge
+        text, with the box of what shows and the score 0 where less than
+        :data:`~rgbd_kcf_tracker.recordings.mot.BARELY_VISIBLE` of the person shows, else 1.
 
         Args:
             frame: the next frame.
             visible: box of the visible part, None where absent.
             body: box of the whole body, None where not known.
             visible_fraction: visible share, 0 to 1; written where it is given.
+            people: everybody by id, the same ids with every frame; None where it is not known.
 
         Raises:
             RecordingError: where it cannot be written.
         """
+        name = f'{self._count + 1:06d}'
+        sizes = {key: file.tell() for key, file in self._files.items()}
+        images = [f'rgb/{name}.{self._suffix}']
+        try:
+            self._write_image(images[0], frame.color)
+            if frame.depth is not None:
+                self._make('depth')
+                images.append(f'depth/{name}.png')
+                self._write_image(images[1], millimetres(frame.depth))
+            if self._count == 0 and frame.intrinsics is not None:
+                camera = frame.intrinsics
+                values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
+                self._write_line('intrinsics.json', json.dumps(values, indent=2))
+            self._write_line('groundtruth.txt', format_box(visible))
+            self._write_line('groundtruth_body.txt', format_box(body))
+            if visible_fraction is not None:
+                self._write_line('visible.txt', f'{visible_fraction:.4f}')
+            if people is not None:
+                self._write_people(people)
+            # Last what makes it a frame, so that a kill leaves all of it or none.
+            self._write_line('timestamps.txt', str(frame.stamp_ns))
+            for image in images:
+                self._show(image)
+        except BaseException:
+            self._take_back(images, sizes)
+            raise
         self._count += 1
-        name = f'{self._count:06d}'
-        self._write_image(self.folder / 'rgb' / f'{name}.{self._suffix}', frame.color)
-        if frame.depth is not None:
-            if not (self.folder / 'depth').exists():
-                (self.folder / 'depth').mkdir()
-            self._write_image(self.folder / 'depth' / f'{name}.png', millimetres(frame.depth))
-        if self._count == 1 and frame.intrinsics is not None:
-            camera = frame.intrinsics
-            values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
-            with open_for_writing(self.folder / 'intrinsics.json') as file:
-                file.write(json.dumps(values, indent=2) + '\n')
-        self._write_line('timestamps.txt', str(frame.stamp_ns))
-        self._write_line('groundtruth.txt', format_box(visible))
-        self._write_line('groundtruth_body.txt', format_box(body))
-        if visible_fraction is not None:
-            self._write_line('visible.txt', f'{visible_fraction:.4f}')
 
-    def write_people(self, people: Mapping[int, PersonTruth]) -> None:
-        """Write where everybody is in the frame that was written last.
-
-        A person ``7`` gets a line in ``groundtruth_7.txt``, ``body_7.txt`` and ``visible_7.txt``
-        (visible share, distance in millimetres); who shows gets one in ``mot.txt``, MOT Challenge
-        text: ``frame,id,x,y,width,height,conf,X,Y,Z``, frames from 1, the box of what shows, the
-        position in metres in the camera's optical frame. ``conf`` is 1, or 0 where less than
-        `CLEARLY_VISIBLE` of the person shows.
+    def close(self, whole: bool = True) -> None:
+        """Close the files; a folder without a frame is removed.
 
         Args:
-            people: by id; give the same ids with every frame.
+            whole: all frames are written: only then does it replace another.
 
         Raises:
             RecordingError: where it cannot be written.
         """
-        rows = []
-        for person, truth in people.items():
-            self._write_line(f'groundtruth_{person}.txt', format_box(truth.visible))
-            self._write_line(f'body_{person}.txt', format_box(truth.body))
-            seen = truth.shown is not None
-            distance = truth.position[2] * 1000 if seen else 0
-            self._write_line(f'visible_{person}.txt',
-                             f'{truth.visible_fraction:.4f},{distance:.0f}')  # fmt: skip
-            if truth.shown is not None:
-                clear = int(truth.visible_fraction >= CLEARLY_VISIBLE)
-                place = ','.join(f'{metres:.3f}' for metres in truth.position)
-                rows.append(f'{self._count},{person},{format_box(truth.shown)},{clear},{place}\n')
-        self._write_line('mot.txt', ''.join(rows), end='')
-
-    def close(self) -> None:
-        """Close the files."""
-        for file in self._files.values():
-            file.close()
+        files, self._files = self._files, {}
+        for file in files.values():
+            with contextlib.suppress(OSError):  # a full disk was told when it was written
+                file.close()
+        self.output.end(whole=whole, anything=self._count > 0)
 
     def __enter__(self) -> SequenceWriter:
         return self
@@ -157,27 +175,76 @@ class SequenceWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        if error is None:
+            self.close()
+        else:
+            with contextlib.suppress(RecordingError):  # the error before says more
+                self.close(whole=False)
 
-    def _write_line(self, name: str, line: str, end: str = '\n') -> None:
-        if name not in self._files:
-            self._files[name] = open_for_writing(self.folder / name)
+    def _write_people(self, people: Mapping[int, PersonTruth]) -> None:
+        shown = {who: truth for who, truth in people.items() if truth.shown is not None}
+        for who, truth in people.items():
+            distance = truth.position[2] * 1000 if who in shown else 0
+            self._write_line(f'groundtruth_{who}.txt', format_box(truth.visible))
+            self._write_line(f'body_{who}.txt', format_box(truth.body))
+            self._write_line(f'visible_{who}.txt', f'{truth.visible_fraction:.4f},{distance:.0f}')
+        rows = Sightings.of(
+            [self._count] * len(shown),
+            list(shown),
+            [truth.shown.as_tuple() for truth in shown.values() if truth.shown is not None],
+            [float(truth.visible_fraction >= BARELY_VISIBLE) for truth in shown.values()],
+            positions=[truth.position for truth in shown.values()],
+        )
+        self._write('mot.txt', mot_text(rows))
+
+    def _show(self, name: str) -> None:
         try:
-            self._files[name].write(line + end)
-            self._files[name].flush()
+            path = self.output.place / name
+            path.with_name(path.name + _PART).rename(path)
         except OSError as error:
-            raise RecordingError(cannot_write(self.folder / name, error)) from None
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
 
-    def _write_image(self, path: Path, image: npt.NDArray[Any]) -> None:
+    def _take_back(self, images: list[str], sizes: dict[str, int]) -> None:
+        """Leave no half of a frame."""
+        for image in images:
+            for end in ('', _PART):
+                with contextlib.suppress(OSError):
+                    (self.output.place / f'{image}{end}').unlink()
+        for key, file in self._files.items():
+            with contextlib.suppress(OSError):
+                file.seek(file.truncate(sizes.get(key, 0)))
+
+    def _make(self, name: str) -> None:
+        try:
+            (self.output.place / name).mkdir(exist_ok=True)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
+
+    def _write_line(self, name: str, line: str) -> None:
+        self._write(name, f'{line}\n')
+
+    def _write(self, name: str, text: str) -> None:
+        try:
+            if name not in self._files:
+                self._files[name] = (self.output.place / name).open('xb', buffering=0)
+            data = text.encode()
+            while data:  # a disk that gets full takes a part
+                data = data[self._files[name].write(data) :]
+        except OSError as error:
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None
+
+    def _write_image(self, name: str, image: npt.NDArray[Any]) -> None:
+        suffix = name[-4:]
         flags = (
             [int(cv2.IMWRITE_PNG_COMPRESSION), 1]
-            if path.suffix == '.png'
+            if suffix == '.png'
             else [int(cv2.IMWRITE_JPEG_QUALITY), 95]
         )
-        done, data = cv2.imencode(path.suffix, image, flags)
+        done, data = cv2.imencode(suffix, image, flags)
         try:
             if not done:
                 raise OSError('image cannot be encoded')
-            path.write_bytes(data.tobytes())
+            with (self.output.place / f'{name}{_PART}').open('xb') as file:
+                file.write(data.tobytes())
         except OSError as error:
-            raise RecordingError(cannot_write(path, error)) from None
+            raise RecordingError(cannot_write(self.output.path / name, error)) from None

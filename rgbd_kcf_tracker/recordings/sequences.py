@@ -14,7 +14,8 @@ from types import TracebackType
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.recordings.containers import inspect
+from rgbd_kcf_tracker.recordings.containers import MAX_SIDE, inspect
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, cannot_read, read_file
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
@@ -24,10 +25,10 @@ from rgbd_kcf_tracker.recordings.images import (
 )
 from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
 from rgbd_kcf_tracker.recordings.textfiles import (
+    folder_intrinsics,
     known,
     natural_key,
     read_boxes,
-    read_intrinsics,
     read_stamps,
 )
 
@@ -45,7 +46,7 @@ class SequenceFolder:
     """A :class:`Recording` of a folder with ``rgb/``.
 
     Read where they are there: ``depth/``, ``groundtruth.txt``,
-    ``groundtruth_body.txt``, ``timestamps.txt`` and ``intrinsics.json``.
+    ``groundtruth_body.txt``, ``timestamps.txt``, ``intrinsics.json`` and ``camera_info.json``.
 
     A depth image belongs to the colour image of the same name (without suffix).
 
@@ -57,6 +58,7 @@ class SequenceFolder:
         self.path = path
         self.name = path.resolve().name
         self.warnings: list[str] = []
+        self._max_pixels = options.max_pixels
         self._color_folder = next(path / n for n in COLOR_FOLDERS if (path / n).is_dir())
         self._colors = _images(self._color_folder)
         if not self._colors:
@@ -64,8 +66,8 @@ class SequenceFolder:
         self._depths = self._find_depths(options)
         self._stamps = self._read_stamps(options)
         self.intrinsics: Intrinsics | None = options.intrinsics
-        if self.intrinsics is None and (path / 'intrinsics.json').exists():
-            self.intrinsics = read_intrinsics(path / 'intrinsics.json')
+        if self.intrinsics is None:
+            self.intrinsics = folder_intrinsics(path)
         self.groundtruth = self._read_truth('groundtruth.txt')
         self.groundtruth_body = known(self._read_truth('groundtruth_body.txt'))
 
@@ -76,7 +78,7 @@ class SequenceFolder:
         """See :meth:`Recording.frames`."""
         for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
             path = self._colors[index]
-            color = _decode_color(path)
+            color = self._decode_color(path)
             depth_path = self._depths[index]
             depth = None if depth_path is None else self._decode_depth(depth_path)
             try:
@@ -172,9 +174,17 @@ class SequenceFolder:
             )
         return boxes[: len(self)]
 
+    def _decode_color(self, path: Path) -> ColorImage:
+        try:
+            return decode_color_bytes(memoryview(read_file(path, MAX_IMAGE)), self._max_pixels)
+        except ImageError as error:
+            raise ImageError(f'{path}: {error}') from None
+
     def _decode_depth(self, path: Path) -> DepthImage | None:
         try:
-            return decode_depth_bytes(memoryview(_read(path)))
+            return decode_depth_bytes(
+                memoryview(read_file(path, MAX_IMAGE)), max_pixels=self._max_pixels
+            )
         except EncodingError as error:
             raise ImageError(f'{path}: {error}') from None
         except ImageError as error:
@@ -186,27 +196,13 @@ def _images(folder: Path) -> list[Path]:
     try:
         found = [p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
     except OSError as error:
-        raise RecordingError(f'{folder} cannot be read: {error.strerror or error}') from None
+        raise RecordingError(cannot_read(folder, error)) from None
     return sorted(found, key=lambda p: natural_key(p.name))
-
-
-def _read(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
-
-
-def _decode_color(path: Path) -> ColorImage:
-    try:
-        return decode_color_bytes(memoryview(_read(path)))
-    except ImageError as error:
-        raise ImageError(f'{path}: {error}') from None
 
 
 def _stream(name: str, paths: list[Path], rate: float | None, role: str) -> StreamInfo:
     try:
-        head = inspect(memoryview(_read(paths[0])))
+        head = inspect(memoryview(read_file(paths[0], MAX_IMAGE)), MAX_SIDE**2)
     except ImageError as error:
         return StreamInfo(name, 'images', len(paths), rate, None, str(error), role)
     encoding = f'{head.name} {head.channels}x{head.bits} bit'

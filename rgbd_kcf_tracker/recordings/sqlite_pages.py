@@ -15,15 +15,24 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from rgbd_kcf_tracker.recordings.files import open_file
+
 _LEAF, _INTERIOR = 13, 5
+
+
+def has_log(path: Path) -> bool:
+    """Whether a write-ahead log with something in it lies beside the database."""
+    try:
+        return path.with_name(path.name + '-wal').stat().st_size > 0
+    except OSError:
+        return False
 
 
 def is_cut_off(path: Path) -> bool:
     """Whether the file is shorter than its own head says (and no write-ahead log has the rest)."""
-    log = path.with_name(path.name + '-wal')
-    if log.exists() and log.stat().st_size:
+    if has_log(path):
         return False
-    with path.open('rb') as file:
+    with open_file(path) as file:
         head = file.read(100)
     if len(head) < 100:
         return True
@@ -33,7 +42,7 @@ def is_cut_off(path: Path) -> bool:
 
 def whole_rows(path: Path, root: int) -> Iterator[int]:
     """Row ids, rising, of the table with root page ``root`` whose pages are all in the file."""
-    with path.open('rb') as file:
+    with open_file(path) as file:
         pages = _Pages(file, path.stat().st_size)
         yield from pages.rows(root)
 

@@ -5,17 +5,23 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.sqlite_pages import is_cut_off, whole_rows
+from rgbd_kcf_tracker.recordings.files import open_file
+from rgbd_kcf_tracker.recordings.sqlite_pages import has_log, is_cut_off, whole_rows
 from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 
 MAGIC = b'SQLite format 3\0'
+# Byte of the head that is 2 where reading needs the write-ahead log.
+_LOGGED = 19
 # A damaged file has text that is no UTF-8, and numbers that are none, too.
 _ERRORS = (sqlite3.Error, UnicodeError, ValueError, OverflowError)
 
@@ -34,21 +40,29 @@ class SqliteStorage:
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
         self.warnings: list[str] = []
-        try:
-            with path.open('rb') as file:
-                magic = file.read(len(MAGIC))
-        except OSError as error:
-            raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
-        if magic != MAGIC:
-            if not magic:
+        self._copy: tempfile.TemporaryDirectory[str] | None = None
+        with open_file(path) as file:
+            head = file.read(_LOGGED + 1)
+        if not head.startswith(MAGIC):
+            if not head:
                 raise RecordingError(f'{path} is empty: nothing was recorded')
             raise RecordingError(f'{path} is no SQLite bag: it does not begin as one')
-        self._database = self._connect()
+        try:
+            self._database = self._connect(logged=head[_LOGGED:] == b'\2')
+        except BaseException:
+            self._drop_copy()
+            raise
 
-    def _connect(self) -> sqlite3.Connection:
-        # With a write-ahead log, in a folder that is not writable, it opens only as immutable.
-        name = quote(str(self.path.resolve()))
-        for mode in ('mode=ro', 'immutable=1'):
+    def _connect(self, logged: bool) -> sqlite3.Connection:
+        place = self.path.resolve()
+        modes: tuple[str, ...] = ('mode=ro', 'immutable=1')
+        if logged:
+            # SQLite would make files beside a database with a write-ahead log, or change them.
+            modes = ('immutable=1',)
+            if has_log(self.path):
+                place, modes = self._copied(), ('mode=ro',)
+        name = quote(os.fsencode(place))
+        for mode in modes:
             try:
                 database = sqlite3.connect(f'file:{name}?{mode}', uri=True)
                 database.execute('SELECT count(*) FROM sqlite_master').fetchone()
@@ -56,6 +70,27 @@ class SqliteStorage:
             except _ERRORS as error:
                 reason = error
         raise RecordingError(f'{self.path} cannot be read: {reason}')
+
+    def _copied(self) -> Path:
+        """The database and its log in a folder of ours."""
+        try:
+            self._copy = tempfile.TemporaryDirectory(prefix='rgbd_kcf_')
+            place = Path(self._copy.name) / 'copy.db3'
+            for end in ('', '-wal'):
+                source = self.path.with_name(self.path.name + end)
+                with open_file(source) as old, Path(f'{place}{end}').open('wb') as new:
+                    shutil.copyfileobj(old, new, 1 << 22)
+        except OSError as error:
+            raise RecordingError(
+                f'{self.path} has a write-ahead log, so a copy is read, which cannot be made in '
+                f'{tempfile.gettempdir()}: {error.strerror or error}: set TMPDIR'
+            ) from None
+        return place
+
+    def _drop_copy(self) -> None:
+        if self._copy is not None:
+            self._copy.cleanup()
+            self._copy = None
 
     def scan(self) -> Iterator[Scanned]:
         """See :meth:`Storage.scan`."""
@@ -118,3 +153,4 @@ class SqliteStorage:
     def close(self) -> None:
         """See :meth:`Storage.close`."""
         self._database.close()
+        self._drop_copy()

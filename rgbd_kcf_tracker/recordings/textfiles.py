@@ -9,9 +9,14 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.files import read_text
+from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
+
+INTRINSICS, CAMERA_INFO = 'intrinsics.json', 'camera_info.json'
 
 # ROS stamps hold 32 bits of seconds.
 _LAST_STAMP_NS = (1 << 31) * 1_000_000_000
@@ -29,8 +34,8 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
 def read_boxes(path: Path) -> list[Box | None]:
     """Boxes of a ground-truth file, one ``x,y,width,height`` per line.
 
-    Numbers may be parted by commas, semicolons, tabs or blanks. A line of ``nan``, or a box without
-    size, is None: the target is absent.
+    Numbers may be parted by commas, semicolons, tabs or blanks. A line of four ``nan``, or a box
+    without size, is None: the target is absent.
 
     Raises:
         RecordingError: naming the line that is none of this.
@@ -41,16 +46,27 @@ def read_boxes(path: Path) -> list[Box | None]:
         try:
             if len(fields) < 4:
                 raise ValueError
-            x, y, width, height = (float(field) for field in fields[:4])
+            boxes.append(box_or_none(*(float(field) for field in fields[:4])))
         except ValueError:
             raise RecordingError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no box: '
                 'write x,y,width,height (nan,nan,nan,nan where absent)'
             ) from None
-        values = (x, y, width, height)
-        absent = not all(math.isfinite(v) for v in values) or width <= 0 or height <= 0
-        boxes.append(None if absent else Box(*values))
     return boxes
+
+
+def box_or_none(x: float, y: float, width: float, height: float) -> Box | None:
+    """The box, or None where the target is absent: four NaN, or no size.
+
+    Raises:
+        ValueError: where some numbers are finite and some are not: a mistake, and no absence.
+    """
+    values = (x, y, width, height)
+    if all(map(math.isnan, values)):
+        return None
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f'{x},{y},{width},{height}')
+    return None if width <= 0 or height <= 0 else Box(*values)
 
 
 def known(boxes: list[Box | None] | None) -> list[Box | None] | None:
@@ -97,15 +113,41 @@ def read_intrinsics(path: Path) -> Intrinsics:
         RecordingError: where one is missing or no number.
     """
     try:
-        values = json.loads(path.read_text(encoding='utf-8'))
+        values = json.loads(read_text(path))
         return Intrinsics(*(float(values[key]) for key in ('fx', 'fy', 'cx', 'cy')))
-    except OSError as error:
-        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
-    except (ValueError, TypeError, KeyError, RgbdKcfError) as error:
+    except RecordingError:
+        raise
+    except (RecursionError, ValueError, TypeError, KeyError, RgbdKcfError) as error:
         raise RecordingError(
             f'{path} holds no intrinsics ({error}): '
             'write {"fx": .., "fy": .., "cx": .., "cy": ..}'
         ) from None
+
+
+def folder_intrinsics(folder: Path) -> Intrinsics | None:
+    """The camera of a sequence folder, None where it states none.
+
+    It is in ``intrinsics.json``, or else in ``camera_info.json``: the fields of
+    ``sensor_msgs/CameraInfo``, ``K`` and ``P`` in small or capital letters.
+
+    Raises:
+        RecordingError: where a file holds no camera.
+    """
+    if (folder / INTRINSICS).exists():
+        return read_intrinsics(folder / INTRINSICS)
+    path = folder / CAMERA_INFO
+    if not path.exists():
+        return None
+    try:
+        fields = {str(name).lower(): value for name, value in json.loads(read_text(path)).items()}
+        found = intrinsics_from_info(SimpleNamespace(k=fields['k'], p=fields.get('p', [0.0] * 12)))
+    except RecordingError:
+        raise
+    except (RecursionError, ValueError, TypeError, KeyError, AttributeError, RgbdKcfError) as error:
+        raise RecordingError(
+            f'{path} holds no camera ({error}): write the fields of CameraInfo, or {INTRINSICS}'
+        ) from None
+    return found
 
 
 def read_lines(path: Path) -> list[str]:
@@ -114,12 +156,7 @@ def read_lines(path: Path) -> list[str]:
     Raises:
         RecordingError: where it cannot be read as text.
     """
-    try:
-        lines = path.read_text(encoding='utf-8-sig').splitlines()
-    except OSError as error:
-        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
-    except UnicodeDecodeError:
-        raise RecordingError(f'{path} is not a text file') from None
+    lines = read_text(path).splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
     return lines

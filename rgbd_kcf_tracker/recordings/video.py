@@ -1,13 +1,16 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""H.264 video that plays everywhere, written by the ffmpeg of imageio-ffmpeg."""
+"""H.264 video that plays everywhere, written by ffmpeg."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import math
 import os
+import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Mapping
@@ -20,42 +23,66 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.errors import MissingExtraError, RecordingError
+from rgbd_kcf_tracker.extras import how_to_get
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.outputs import OutputFile, check_outputs
 from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
-from rgbd_kcf_tracker.recordings.results import cannot_write, prepare_output
 from rgbd_kcf_tracker.track import Track
 
+SUFFIXES = ('.mp4', '.m4v', '.mov', '.mkv')
+
 _SMALLEST_WIDTH = 640
+_QUIET = ['-hide_banner', '-loglevel', 'error', '-y']
+# In pieces of a second, each complete in itself: a full disk or a kill loses the last one alone.
+_IN_PIECES = ['-movflags', '+empty_moov+default_base_moof', '-frag_duration', '1000000']
+_IN_ONE = ['-c', 'copy', '-movflags', '+faststart']
+
+
+def require_video(path: str | os.PathLike[str]) -> None:
+    """Refuse a name of no video that is written, and a machine without ffmpeg.
+
+    Raises:
+        RecordingError: naming the suffixes.
+        MissingExtraError: saying what to install.
+    """
+    if Path(path).suffix.lower() not in SUFFIXES:
+        raise RecordingError(f'{path} must end in {", ".join(SUFFIXES)}: these are written')
+    _ffmpeg(Path(path))
 
 
 class VideoWriter:
     """Writes pictures as mp4 (H.264, yuv420p). The first picture sets the size.
 
     ffmpeg runs in a session of its own: when this program dies, even by kill -9, its input ends and
-    it closes the file properly.
+    it closes the file properly. The file grows in pieces that can be played while it does, and is
+    put into one when it is closed, if the disk has room for that.
 
     Args:
-        path: the file, ending in ``.mp4`` or another suffix that ffmpeg knows. Missing folders are
-            made.
+        path: the file, ending in one of :data:`SUFFIXES`.
         fps: frames per second.
+        overwrite: replace a file that is there.
+
+    Attributes:
+        output: the file.
 
     Raises:
-        RecordingError: where it cannot be written.
+        RecordingError: where it cannot be written, is there already, or ffmpeg is missing.
     """
 
-    def __init__(self, path: str | os.PathLike[str], fps: float = 30.0) -> None:
+    def __init__(
+        self, path: str | os.PathLike[str], fps: float = 30.0, overwrite: bool = False
+    ) -> None:
         self.path = Path(path)
+        check_outputs({'video': self.path}, overwrite=overwrite)
+        require_video(self.path)
+        self.output = OutputFile(self.path, overwrite)
+        self.output.file.close()  # ffmpeg opens it by its name
         self.fps = min(max(fps, 0.1), 240.0)
         self._process: subprocess.Popen[bytes] | None = None
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (closed by close)
         self._size = 0, 0
-        prepare_output(self.path)
-        try:
-            self.path.open('ab').close()
-        except OSError as error:
-            raise RecordingError(cannot_write(self.path, error)) from None
 
     def write_track(
         self, frame: Frame, track: Track, truth: Box | None = None, caption: str = ''
@@ -87,31 +114,65 @@ class VideoWriter:
         try:
             self._process.stdin.write(np.ascontiguousarray(image).data)
         except (BrokenPipeError, OSError):
-            self._process.wait()
-            raise RecordingError(self._failure()) from None
+            raise RecordingError(self._failure(self._process.wait())) from None
 
-    def close(self) -> None:
-        """End the video.
+    def close(self, whole: bool = True) -> None:
+        """End the video; one without a picture is removed.
+
+        Args:
+            whole: all pictures are written: only then does it replace another.
 
         Raises:
             RecordingError: where ffmpeg could not write it.
         """
         process, self._process = self._process, None
-        if process is None:
-            self._log.close()
-            # Without a single picture there is no video: leave no empty file.
+        failure = ''
+        if process is not None:
+            assert process.stdin is not None
             with contextlib.suppress(OSError):
-                if self.path.stat().st_size == 0:
-                    self.path.unlink()
-            return
-        assert process.stdin is not None
-        with contextlib.suppress(OSError):
-            process.stdin.close()
-        if process.wait() != 0:
-            message = self._failure()
-            self._log.close()
-            raise RecordingError(message)
+                process.stdin.close()
+            if process.wait() != 0:
+                failure = self._failure(process.returncode)
         self._log.close()
+        place = self.output.place
+        anything = place.exists() and place.stat().st_size > 0
+        if anything and not failure:
+            self._put_together(place)
+        self.output.end(whole=whole and not failure, anything=anything)
+        if failure:
+            raise RecordingError(failure)
+
+    def _put_together(self, place: Path) -> None:
+        """The pieces as one, the index first; where that fails, they stay as they are."""
+        if place.suffix.lower() == '.mkv':
+            return
+        one = place.with_name(f'.{place.name}.{os.getpid()}{place.suffix}')
+        try:
+            done = subprocess.run(
+                [
+                    _ffmpeg(self.path),
+                    '-hide_banner',
+                    '-loglevel',
+                    'error',
+                    '-y',
+                    '-i',
+                    os.fspath(place),
+                    *_IN_ONE,
+                    os.fspath(one),
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+                check=False,
+            )
+            if done.returncode == 0:
+                shutil.copymode(place, one)
+                one.replace(place)
+        except OSError:
+            pass
+        finally:
+            one.unlink(missing_ok=True)
 
     def __enter__(self) -> VideoWriter:
         return self
@@ -125,25 +186,18 @@ class VideoWriter:
         if error is None:
             self.close()
         else:
-            with contextlib.suppress(RecordingError):
-                self.close()
+            with contextlib.suppress(RecordingError):  # the error before says more
+                self.close(whole=False)
 
     def _start(self, width: int, height: int) -> subprocess.Popen[bytes]:
-        try:
-            import imageio_ffmpeg
-
-            program = imageio_ffmpeg.get_ffmpeg_exe()
-        except (ImportError, RuntimeError) as error:
-            raise RecordingError(
-                f'{self.path} cannot be written: no ffmpeg ({error}); install imageio-ffmpeg'
-            ) from None
         # yuv420p wants even sides.
         shape = 'pad=ceil(iw/2)*2:ceil(ih/2)*2'
         command = [
-            program, '-hide_banner', '-loglevel', 'error', '-y',
+            _ffmpeg(self.path), *_QUIET,
             '-f', 'rawvideo', '-pix_fmt', 'bgr24', '-s', f'{width}x{height}', '-r', f'{self.fps:g}',
             '-i', '-', '-an', '-vf', shape, '-c:v', 'libx264', '-preset', 'veryfast', '-crf', '20',
-            '-pix_fmt', 'yuv420p', '-movflags', '+faststart', os.fspath(self.path),
+            '-pix_fmt', 'yuv420p', *([] if self.path.suffix.lower() == '.mkv' else _IN_PIECES),
+            os.fspath(self.output.place),
         ]  # fmt: skip
         try:
             return subprocess.Popen(
@@ -156,10 +210,27 @@ class VideoWriter:
         except OSError as error:
             raise RecordingError(f'{self.path} cannot be written: ffmpeg: {error}') from None
 
-    def _failure(self) -> str:
+    def _failure(self, code: int) -> str:
         self._log.seek(0)
         lines = self._log.read().decode('utf-8', 'replace').strip().splitlines()
-        return f'{self.path} cannot be written: ffmpeg says {lines[-1] if lines else "nothing"!r}'
+        # The first line tells the cause, behind the part of ffmpeg in brackets.
+        said = lines[0].rpartition('] ')[2] if lines else ''
+        if code == -signal.SIGXFSZ:
+            said = os.strerror(errno.EFBIG)
+        return f'{self.path} cannot be written: ffmpeg says {said or f"nothing ({code})"!r}'
+
+
+def _ffmpeg(path: Path) -> str:
+    """The program of imageio-ffmpeg, or else the system's."""
+    try:
+        import imageio_ffmpeg
+
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except (ImportError, RuntimeError):
+        found = shutil.which('ffmpeg')
+    if found is None:
+        raise MissingExtraError(f'{path} cannot be written without ffmpeg: {how_to_get("video")}')
+    return found
 
 
 def _enlarged(frame: Frame) -> tuple[npt.NDArray[np.uint8], int]:

@@ -42,8 +42,6 @@ _LEAST_CELLS = 5
 
 # Most pixels that a window may have: four times a 640x480 image.
 _MOST_PIXELS = 1.2e6
-# Longest side of a target in window pixels.
-_LONGEST = 4000
 
 
 @dataclass(frozen=True)
@@ -138,9 +136,8 @@ class WindowGeometry:
             if math.sqrt(width * height) / reduction < parameters.halve_above:
                 break
             reduction *= 2
-        # A box that is larger than any image must not take all memory.
         pixels = math.prod(max(side * (1 + parameters.padding), 1.0) for side in (width, height))
-        while pixels > _MOST_PIXELS * reduction**2 or max(width, height) > _LONGEST * reduction:
+        while pixels > _MOST_PIXELS * reduction**2:
             reduction *= 2
         # Whole pixels, rounded down, as in the reference.
         inner = [max(math.floor(side / reduction), 1) for side in (width, height)]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.errors import DatasetError, RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import (
     everyone,
     folder,
@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     broken,
     entries,
 )
+from rgbd_kcf_tracker.recordings.files import require_source
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
@@ -97,10 +98,10 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
         )
     else:
         path = Path(text)
-        if not path.exists():
-            raise DatasetError(
-                f'{text} does not exist: give a folder, a bag, or simulated scenes as sim:all'
-            )
+        try:
+            require_source(path)
+        except RecordingError as error:
+            raise DatasetError(f'{error} (folders, bags, or simulated scenes as sim:all)') from None
         found = _walk(path, chosen, _DEPTH)
         if not found and chosen.everyone:
             raise DatasetError(

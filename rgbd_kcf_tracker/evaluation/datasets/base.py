@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -121,6 +122,12 @@ class Sequence:
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
     path: Path | None = None
+
+    def __post_init__(self) -> None:
+        # Names of files need not be UTF-8, those in tables do.
+        for field_name in ('name', 'scenario'):
+            text = os.fsencode(getattr(self, field_name)).decode('utf-8', 'backslashreplace')
+            object.__setattr__(self, field_name, text)
 
 
 def broken(path: Path, reason: str) -> Sequence:

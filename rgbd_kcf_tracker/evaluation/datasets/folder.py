@@ -35,8 +35,10 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.mot import REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import (
+    CAMERA_INFO,
+    INTRINSICS,
+    folder_intrinsics,
     read_boxes,
-    read_intrinsics,
     read_lines,
     read_stamps,
 )
@@ -46,7 +48,7 @@ TAIL_FRAMES = 15
 
 _BODY = 'groundtruth_body.txt'
 MOT_FILE = 'mot.txt'
-_PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', 'intrinsics.json')
+_PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', INTRINSICS, CAMERA_INFO)
 
 
 def is_sequence(path: Path) -> bool:
@@ -73,7 +75,8 @@ def find(path: Path, fps: float) -> list[Sequence]:
             path / 'depth',
             _body_file(truth) if person else path / _BODY,
             path / 'timestamps.txt',
-            path / 'intrinsics.json',
+            path / INTRINSICS,
+            path / CAMERA_INFO,
         )
         result.append(
             Sequence(
@@ -156,17 +159,17 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         RecordingError: for a file that cannot be read or a line that is no box.
     """
     images = image_files(path / 'rgb')
-    if not truth_path.is_file():
+    if not truth_path.exists():
         raise DatasetError(f'{path} has no {truth_path.name}: nothing to measure against')
     boxes = read_boxes(truth_path)
     check_lengths(truth_path, len(boxes), images, path / 'rgb')
     body = None
     body_path = _body_file(truth_path) if person else path / _BODY
-    if body_path.is_file():
+    if body_path.exists():
         body = read_boxes(body_path)
         check_lengths(body_path, len(body), images, path / 'rgb')
     fractions = None
-    if visible_path.is_file():
+    if visible_path.exists():
         fractions = read_fractions(visible_path)
         check_lengths(visible_path, len(fractions), images, path / 'rgb')
 
@@ -226,10 +229,8 @@ def read_frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames
             raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')
     stamps = even_stamps(len(images), fps)
     stamps_path = path / 'timestamps.txt'
-    if stamps_path.is_file():
+    if stamps_path.exists():
         stamps = tuple(read_stamps(stamps_path))
         check_lengths(stamps_path, len(stamps), images, path / 'rgb')
-    intrinsics = None
-    if (path / 'intrinsics.json').is_file():
-        intrinsics = read_intrinsics(path / 'intrinsics.json')
+    intrinsics = folder_intrinsics(path)
     return ImageFrames(images, depths, stamps, intrinsics)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,11 +14,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.errors import DatasetError, ImageError
+from rgbd_kcf_tracker.errors import DatasetError, ImageError, RecordingError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.containers import inspect
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
 from rgbd_kcf_tracker.recordings.images import (
     decode_color_bytes,
     decode_depth_bytes,
@@ -152,13 +152,6 @@ def shifted(box: Box | None, by: float) -> Box | None:
     return None if box is None else box.moved(by, by)
 
 
-def box_or_none(x: float, y: float, width: float, height: float) -> Box | None:
-    """The box, or None where a number is not finite or it has no size."""
-    if not all(map(math.isfinite, (x, y, width, height))) or width <= 0 or height <= 0:
-        return None
-    return Box(x, y, width, height)
-
-
 def _princeton_depth(data: memoryview) -> npt.NDArray[np.float32]:
     head = inspect(data)
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -169,6 +162,6 @@ def _princeton_depth(data: memoryview) -> npt.NDArray[np.float32]:
 
 def _bytes(path: Path) -> bytes:
     try:
-        return path.read_bytes()
-    except OSError as error:
-        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+        return read_file(path, MAX_IMAGE)
+    except RecordingError as error:
+        raise DatasetError(str(error)) from None

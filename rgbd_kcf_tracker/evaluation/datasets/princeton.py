@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_tok
 from rgbd_kcf_tracker.evaluation.datasets.images import ImageFrames, check_lengths
 from rgbd_kcf_tracker.evaluation.metrics.princeton import CATEGORIES
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.recordings.textfiles import read_boxes
+from rgbd_kcf_tracker.recordings.textfiles import read_boxes, read_lines
 
 MAT_FILES = ('framesNEW.mat', 'frames.mat')
 """The first that is there is taken: framesNEW.mat is DS-KCF's better pairing of the same images."""
@@ -64,18 +64,16 @@ def read_categories(path: Path) -> dict[str, dict[str, str]]:
     if not path.is_file():
         return {}
     result: dict[str, dict[str, str]] = {}
-    with path.open(encoding='utf-8-sig', newline='') as file:
-        for number, row in enumerate(csv.DictReader(file), start=2):
-            own = {}
-            for split, names in CATEGORIES.items():
-                value = (row.get(split) or '').strip().lower()
-                if value not in names:
-                    raise DatasetError(
-                        f'{path}, line {number}: {split} is {value!r}: '
-                        f'give one of {", ".join(names)}'
-                    )
-                own[split] = value
-            result[(row.get('sequence') or '').strip()] = own
+    for number, row in enumerate(csv.DictReader(read_lines(path)), start=2):
+        own = {}
+        for split, names in CATEGORIES.items():
+            value = (row.get(split) or '').strip().lower()
+            if value not in names:
+                raise DatasetError(
+                    f'{path}, line {number}: {split} is {value!r}: give one of {", ".join(names)}'
+                )
+            own[split] = value
+        result[(row.get('sequence') or '').strip()] = own
     return result
 
 

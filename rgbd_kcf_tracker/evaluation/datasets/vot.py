@@ -21,13 +21,12 @@ from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
-    box_or_none,
     check_lengths,
     even_stamps,
     image_files,
 )
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.textfiles import read_lines
+from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
 
 _PARTS = ('sequence', 'color', 'depth')
 
@@ -99,7 +98,7 @@ def read_regions(path: Path) -> list[Box | None]:
     for number, line in enumerate(read_lines(path), start=1):
         try:
             result.append(parse_region(line.strip()))
-        except ValueError:
+        except (ValueError, OverflowError):
             raise DatasetError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no region: write '
                 'x,y,width,height, a polygon, a mask, or nan,nan,nan,nan'

@@ -1,0 +1,78 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Ctrl-C: at once while nothing is written, between two steps while something is.
+
+An exception that comes up anywhere can come up in a record that is half written, or in a callback
+of a library that swallows it. So while work is under way the first Ctrl-C is only noted, and the
+work asks for it between its steps; the second one does not wait.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+EXIT_INTERRUPTED = 130
+
+
+class Interrupts:
+    """What came of Ctrl-C in this process."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        """Whether it was pressed."""
+        self._held = False
+        self._notice = ''
+
+    @contextmanager
+    def handled(self) -> Iterator[None]:
+        """Take care of the signal inside; where it is ignored or another's, leave it so."""
+        before = signal.getsignal(signal.SIGINT)
+        ours = (
+            threading.current_thread() is threading.main_thread()
+            and before is signal.default_int_handler
+        )
+        self.asked = False
+        if ours:
+            signal.signal(signal.SIGINT, self._handle)
+        try:
+            yield
+        finally:
+            if ours:
+                signal.signal(signal.SIGINT, before)
+
+    @contextmanager
+    def held(self, notice: str = '') -> Iterator[None]:
+        """Note the first Ctrl-C inside, for :meth:`check`, and print ``notice`` for it."""
+        before = self._held, self._notice
+        self._held, self._notice = True, notice
+        try:
+            yield
+        finally:
+            self._held, self._notice = before
+
+    def check(self) -> None:
+        """Stop here where Ctrl-C was pressed.
+
+        Raises:
+            KeyboardInterrupt: where it was.
+        """
+        if self.asked:
+            raise KeyboardInterrupt
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        again, self.asked = self.asked, True
+        if again or not self._held:
+            raise KeyboardInterrupt
+        if self._notice:
+            import sys
+
+            print(self._notice, file=sys.stderr, flush=True)
+
+
+interrupts = Interrupts()
+"""The one of this process: it has one signal."""

@@ -1,0 +1,38 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Libraries that a robot does without, and what to install where one is missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from rgbd_kcf_tracker.errors import MissingExtraError
+
+EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
+    'report': (('matplotlib', 'jinja2'), 'python3-matplotlib python3-jinja2'),
+    'video': (('imageio_ffmpeg',), 'ffmpeg'),
+    'tools': (('tqdm', 'psutil'), 'python3-tqdm python3-psutil'),
+}
+"""Extras of the installation: their modules, and Ubuntu's packages with the same."""
+
+
+def require(extra: str, purpose: str) -> None:
+    """Make sure that the libraries of an extra are there, without importing them.
+
+    Args:
+        extra: its name.
+        purpose: what needs it, as the message begins.
+
+    Raises:
+        MissingExtraError: saying what to install.
+    """
+    missing = [name for name in EXTRAS[extra][0] if find_spec(name) is None]
+    if missing:
+        raise MissingExtraError(f'{purpose} needs {", ".join(missing)}: {how_to_get(extra)}')
+
+
+def how_to_get(extra: str) -> str:
+    """What to type to install an extra."""
+    packages = EXTRAS[extra][1]
+    return f"pip install 'rgbd_kcf_tracker[{extra}]', or on Ubuntu: sudo apt install {packages}"

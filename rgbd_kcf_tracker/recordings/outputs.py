@@ -1,0 +1,378 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Files and folders that are written: never a source, nothing replaced unasked, nothing lost.
+
+A new file is written in its place, so that all there is of it can be read while it grows and after
+a kill. One that replaces another is written beside it, as ``NAME.part.SUFFIX``, and takes its name
+when it is whole: until then, and after an interruption, the old one stays as it was. Files are told
+apart by device and inode, not by their paths: hard links, symbolic links and file systems that know
+no case give one file many names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import logging
+import os
+import shutil
+import stat
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.files import kind_of, why
+
+T = TypeVar('T')
+_LOG = logging.getLogger(__name__)
+
+Identity = tuple[int, int]
+"""Device and inode."""
+
+_BESIDE = ('-wal', '-shm', '-journal')
+"""What SQLite keeps beside a database, by the end of its name."""
+
+
+def check_outputs(
+    outputs: Mapping[str, str | os.PathLike[str]],
+    sources: Sequence[str | os.PathLike[str]] = (),
+    overwrite: bool = False,
+    folders: Collection[str] = (),
+) -> None:
+    """Refuse, before anything is done, what must not or cannot be written.
+
+    Args:
+        outputs: paths by the names of their options, which the messages say.
+        sources: what is read: files, or folders with all that lies in them.
+        overwrite: whether files that are there may be replaced; sources never are.
+        folders: the options whose paths are folders.
+
+    Raises:
+        RecordingError: for an output that is a source or lies in one, is there already, is no
+            regular file, lies in a folder that does not exist, or is another output, too.
+    """
+    seen: dict[tuple[Identity, str], str] = {}
+    for option, given in outputs.items():
+        path = Path(given)
+        target = _target(path)
+        _check_place(path, target)
+        there = _stat(target)
+        name = f'{option} {path}'
+        for source in sources:
+            if there is not None and _identity(there) in _identities(source, there):
+                raise RecordingError(f'{name} is the source itself: give another name')
+            if _lies_in(target, source):
+                raise RecordingError(
+                    f'{name} lies inside the source {source}: give a name outside of it'
+                )
+        if there is None:
+            folder = _stat(target.parent)
+            assert folder is not None  # _check_place has seen it
+            key = _identity(folder), target.name
+        else:
+            key = _identity(there), ''
+            if option in folders:
+                _check_folder(path, there)
+                if not overwrite and os.listdir(target):
+                    raise RecordingError(_is_there(path))
+            else:
+                _check_replaceable(path, there, overwrite)
+        if key in seen:
+            raise RecordingError(f'{name} is {seen[key]}, too: give each its own file')
+        seen[key] = name
+
+
+def make_folder(path: Path) -> None:
+    """A folder to write into; it may be there. The folder that it lies in must be.
+
+    Raises:
+        RecordingError: where it cannot be made.
+    """
+    target = _target(path)
+    _check_place(path, target)
+    try:
+        target.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
+
+
+class OutputFile:
+    """A file that is written; see the module for where.
+
+    Args:
+        path: the file; its folder must be there.
+        overwrite: replace a file that is there, when this one is whole.
+
+    Attributes:
+        path: as it was given.
+        place: where it is written until :meth:`end`.
+        file: open for writing.
+
+    Raises:
+        RecordingError: where it cannot be written, or is there already.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
+        self.path = Path(path)
+        self._target = _target(self.path)
+        _check_place(self.path, self._target)
+        there = _stat(self._target)
+        mode = 0o666
+        try:
+            if there is None:
+                self.place = self._target
+                number = _create(self.place, mode)
+            else:
+                _check_replaceable(self.path, there, overwrite)
+                self.place, number = _first_free(self._target, lambda p: _create(p, mode))
+                os.fchmod(number, stat.S_IMODE(there.st_mode))
+        except FileExistsError:
+            raise RecordingError(_is_there(self.path)) from None
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+        self.file: BinaryIO = os.fdopen(number, 'wb')
+        self._ended = False
+
+    def write(self, data: bytes) -> None:
+        """Write bytes and hand them to the system: from here on a kill loses none of them.
+
+        Raises:
+            RecordingError: where they cannot be written.
+        """
+        try:
+            self.file.write(data)
+            self.file.flush()
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+
+    def end(self, *, whole: bool, anything: bool) -> None:
+        """Close the file and put it in its place, or leave nothing where there is nothing in it.
+
+        Args:
+            whole: it is finished: only then does it replace another.
+            anything: it holds what is worth keeping.
+
+        Raises:
+            RecordingError: where that cannot be done.
+        """
+        if self._ended:
+            return
+        self._ended = True
+        replaces = self.place != self._target
+        try:
+            try:
+                if anything and whole and replaces and not self.file.closed:
+                    self.file.flush()
+                    os.fsync(self.file.fileno())  # or a power cut leaves neither old nor new
+            finally:
+                with contextlib.suppress(OSError):  # a full disk was told when it was written
+                    self.file.close()
+            if not anything:
+                self.place.unlink(missing_ok=True)
+            elif whole and replaces:
+                self.place.replace(self._target)
+            elif replaces:
+                _tell_kept(self.path, self.place)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+
+
+class OutputFolder:
+    """A folder that is written; see the module for where.
+
+    Args:
+        path: the folder; it may be there while it is empty. The folder that it lies in must be.
+        known: names that a folder may hold to be replaced, * for any letters: one with others is
+            not of our making.
+        overwrite: replace a folder that is there, when this one is whole.
+
+    Attributes:
+        path: as it was given.
+        place: where it is written until :meth:`end`.
+
+    Raises:
+        RecordingError: where it cannot be written, or is there already.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], known: Collection[str], overwrite: bool = False
+    ) -> None:
+        self.path = Path(path)
+        self._target = _target(self.path)
+        _check_place(self.path, self._target)
+        there = _stat(self._target)
+        self._made = there is None
+        try:
+            if there is None:
+                self.place = self._target
+                self.place.mkdir()
+                return
+            _check_folder(self.path, there)
+            held = sorted(os.listdir(self._target))
+            if not held:
+                self.place = self._target
+                return
+            if not overwrite:
+                raise RecordingError(_is_there(self.path))
+            others = [name for name in held if not any(fnmatchcase(name, k) for k in known)]
+            if others:
+                raise RecordingError(
+                    f'{self.path} holds {", ".join(others[:3])}, which we did not write: '
+                    'it is not replaced'
+                )
+            self.place, _ = _first_free(self._target, os.mkdir)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+
+    def end(self, *, whole: bool, anything: bool) -> None:
+        """Put the folder in its place; see :meth:`OutputFile.end`."""
+        replaces = self.place != self._target
+        try:
+            if not anything:
+                for held in self.place.iterdir():
+                    shutil.rmtree(held) if held.is_dir() else held.unlink()
+                if self._made or replaces:
+                    self.place.rmdir()
+            elif whole and replaces:
+                old, _ = _first_free(self._target, os.mkdir)
+                self._target.rename(old)
+                self.place.rename(self._target)
+                shutil.rmtree(old)
+            elif replaces:
+                _tell_kept(self.path, self.place)
+        except OSError as error:
+            raise RecordingError(cannot_write(self.path, error)) from None
+
+
+def _tell_kept(path: Path, place: Path) -> None:
+    _LOG.warning('%s is left as it was; what was written of the new one is %s', path, place)
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Write a file that is in memory under another name, then move it into place.
+
+    Unlike :class:`OutputFile` it is whole whenever it is there. Its folder is made.
+
+    Raises:
+        RecordingError: where it cannot be written.
+    """
+    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(data, str):  # names of files need not be UTF-8
+            data = data.encode('utf-8', 'backslashreplace')
+        temporary.write_bytes(data)
+        temporary.replace(path)
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+def cannot_write(path: object, error: OSError) -> str:
+    """The message for a failed write."""
+    return f'{path} cannot be written: {why(error)}'
+
+
+def _target(path: Path) -> Path:
+    """The path with its links followed, so that a link is not replaced but what it stands for."""
+    return Path(os.path.realpath(path))
+
+
+def _check_place(path: Path, target: Path) -> None:
+    """Refuse a path whose folder is not there: a mistyped one would be made."""
+    try:
+        if not stat.S_ISDIR(os.stat(target.parent).st_mode):
+            raise NotADirectoryError(20, os.strerror(20))
+    except FileNotFoundError:
+        raise RecordingError(
+            f'{path} cannot be written: there is no folder {path.parent}: make it first'
+        ) from None
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
+
+
+def _check_folder(path: Path, there: os.stat_result) -> None:
+    if not stat.S_ISDIR(there.st_mode):
+        what = 'a file' if stat.S_ISREG(there.st_mode) else kind_of(there.st_mode)
+        raise RecordingError(f'{path} is {what}: give the name of a folder')
+
+
+def _check_replaceable(path: Path, there: os.stat_result, overwrite: bool) -> None:
+    if not stat.S_ISREG(there.st_mode):
+        raise RecordingError(f'{path} is {kind_of(there.st_mode)}: give the name of a file')
+    if not overwrite:
+        raise RecordingError(_is_there(path))
+
+
+def _is_there(path: Path) -> str:
+    return f'{path} is there already: give another name, or add --overwrite to replace it'
+
+
+def _first_free(target: Path, make: Callable[[Path], T]) -> tuple[Path, T]:
+    """The first name beside ``target`` that is free, and what ``make`` gave for it."""
+    for number in itertools.count(1):
+        part = '.part' if number == 1 else f'.part{number}'
+        path = target.with_name(f'{target.stem}{part}{target.suffix}')
+        with contextlib.suppress(FileExistsError):
+            return path, make(path)
+    raise AssertionError('unreachable')
+
+
+def _create(path: Path, mode: int) -> int:
+    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, mode)
+
+
+def _stat(path: Path | str) -> os.stat_result | None:
+    """Of what is there; None where nothing is.
+
+    Raises:
+        RecordingError: where that cannot be told.
+    """
+    try:
+        return os.stat(path)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
+
+
+def _identity(there: os.stat_result) -> Identity:
+    return there.st_dev, there.st_ino
+
+
+def _lies_in(target: Path, source: str | os.PathLike[str]) -> bool:
+    """Whether ``target`` lies in the folder ``source``, at any depth."""
+    try:
+        folder = os.stat(source)
+        if not stat.S_ISDIR(folder.st_mode):
+            return False
+        return any(os.path.samestat(os.stat(parent), folder) for parent in target.parents)
+    except OSError:
+        return False  # the source is not there: opening it says so
+
+
+def _identities(source: str | os.PathLike[str], output: os.stat_result) -> Iterator[Identity]:
+    """Of a source, and of all files in it where ``output`` could be one of them."""
+    path = os.fspath(source)
+    for name in (path, *(path + end for end in _BESIDE)):
+        with contextlib.suppress(OSError):
+            yield _identity(os.stat(name))
+    if stat.S_ISDIR(output.st_mode):
+        return
+    seen: set[Identity] = set()
+    for folder, subfolders, names in os.walk(path, followlinks=True):
+        for name in names:
+            with contextlib.suppress(OSError):
+                yield _identity(os.stat(os.path.join(folder, name)))
+        # Links may lead in circles.
+        for name in list(subfolders):
+            with contextlib.suppress(OSError):
+                identity = _identity(os.stat(os.path.join(folder, name)))
+                if identity in seen:
+                    subfolders.remove(name)
+                seen.add(identity)

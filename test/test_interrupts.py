@@ -1,0 +1,272 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Ctrl-C at any moment: no traceback, no hang, and nothing lost of what was done."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rgbd_kcf_tracker.cli import bench
+from rgbd_kcf_tracker.cli.common import progress
+from rgbd_kcf_tracker.cli.interrupts import interrupts
+from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.evaluation import jobs, runner, speed
+from rgbd_kcf_tracker.recordings import open_recording
+
+SMALL = ['--size', '160x90', '--duration', '1']
+
+pytestmark = pytest.mark.timeout(120)
+
+
+@pytest.fixture(autouse=True)
+def _ours() -> Iterator[None]:
+    """As in a program of its own, whatever pytest or a shell in the background did."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def environment() -> dict[str, str]:
+    return os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}
+
+
+STOP_AT_IMPORT = """
+import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+wanted = sys.argv.pop(1)
+class Stop:
+    def find_spec(self, name, *rest):
+        if name == wanted:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Stop())
+from rgbd_kcf_tracker.cli.main import main
+sys.exit(main())
+"""
+
+
+@pytest.mark.parametrize('module', ['argparse', 'numpy', 'cv2', 'scipy.fft', 'mcap', 'rosbags'])
+def test_while_the_program_starts(module: str, tmp_path: Path) -> None:
+    assert main(['simulate', str(tmp_path / 'a.mcap'), *SMALL, '--rate', '5']) == 0
+    words = ['track', 'a.mcap', '--output', 'a.csv', '--bag', 'out.mcap']
+    done = subprocess.run(
+        [sys.executable, '-c', STOP_AT_IMPORT, module, *words], cwd=tmp_path,
+        capture_output=True, text=True, env=environment(), timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 130, done.stderr
+    assert done.stderr == 'rgbd-kcf: interrupted\n'
+    assert [p.name for p in tmp_path.iterdir()] == ['a.mcap']
+
+
+def test_the_first_waits_for_the_step_and_the_second_does_not() -> None:
+    done = []
+
+    def steps(presses: int) -> None:
+        done.clear()
+        with interrupts.handled():
+            for number in progress(range(5), 5, 'steps'):
+                if number == 2:
+                    for _ in range(presses):
+                        signal.raise_signal(signal.SIGINT)
+                done.append(number)
+
+    with pytest.raises(KeyboardInterrupt):
+        steps(1)
+    assert done == [0, 1, 2]
+    with pytest.raises(KeyboardInterrupt):
+        steps(2)
+    assert done == [0, 1]
+    steps(0)
+    assert done == [0, 1, 2, 3, 4]
+
+
+def test_one_that_a_library_swallows_is_not_forgotten() -> None:
+    with interrupts.handled():
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            next(iter(progress(range(5), 5, 'steps')))
+
+
+def test_a_signal_that_is_ignored_stays_so() -> None:
+    """As for programs that a shell starts in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with interrupts.handled():
+        signal.raise_signal(signal.SIGINT)
+        assert list(progress(range(3), 3, 'steps')) == [0, 1, 2]
+
+
+@pytest.mark.parametrize('command', ['track', 'convert', 'simulate'])
+def test_what_was_written_is_whole(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    """Ctrl-C in the middle of a frame: that frame is finished, and the files are closed."""
+    source = tmp_path / 'walk'
+    assert main(['simulate', str(source), *SMALL, '--rate', '10']) == 0
+    from rgbd_kcf_tracker.recordings import bag_writer
+
+    real, count = bag_writer.BagWriter._write_image, iter(range(100))
+
+    def stopping(self: Any, *words: Any) -> None:
+        real(self, *words)
+        if next(count) == 6:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(bag_writer.BagWriter, '_write_image', stopping)
+    out = tmp_path / 'out.mcap'
+    words = {
+        'track': ['track', str(source), '--variant', 'kcf', '--bag', str(out)],
+        'convert': ['convert', str(source), str(out)],
+        'simulate': ['simulate', str(out), *SMALL, '--rate', '10'],
+    }[command]
+    capsys.readouterr()
+    assert main(words) == 130
+    assert capsys.readouterr().err.endswith('rgbd-kcf: interrupted\n')
+    with open_recording(out) as recording:
+        assert [f.depth is not None for f in recording.frames()] == [True] * 4
+        assert recording.warnings == []
+
+
+# -- evaluate, bench ---------------------------------------------------------------------------
+
+
+EVALUATE = ['evaluate', 'sim:normal,behind_box,crowd', '--size', '160x90', '--duration', '0.5',
+            '--variants', 'kcf', '--report']  # fmt: skip
+
+
+def test_evaluate_finishes_the_run_under_way_and_reports(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real, begun = jobs.run_job, []
+
+    def stopping(job: jobs.Job) -> list[jobs.Failure]:
+        begun.append(job.sequence.name)
+        if len(begun) == 2:
+            signal.raise_signal(signal.SIGINT)
+        return real(job)
+
+    monkeypatch.setattr(runner, 'run_job', stopping)
+    report = str(tmp_path / 'report')
+    assert main([*EVALUATE, report, '--jobs', '1']) == 130
+    said = capsys.readouterr()
+    assert 'the runs under way are finished, then it stops' in said.err
+    assert 'the same command goes on from here' in said.err
+    assert 'report:' in said.out
+    assert begun == ['normal/1', 'behind_box/1']
+    table = (tmp_path / 'report' / 'per_frame.csv').read_text()
+    assert 'kcf,behind_box/1,14,' in table
+    assert main([*EVALUATE, report, '--jobs', '1']) == 0
+    assert begun[2:] == ['crowd/1']
+
+
+def test_evaluate_stopped_before_the_first_run_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = runner.run_job
+
+    def stopping(job: jobs.Job) -> list[jobs.Failure]:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        return real(job)
+
+    monkeypatch.setattr(runner, 'run_job', stopping)
+    assert main([*EVALUATE, str(tmp_path / 'report'), '--jobs', '1']) == 130
+    assert capsys.readouterr().err.endswith('rgbd-kcf: interrupted\n')
+    assert not (tmp_path / 'report' / 'results').exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('presses', [1, 2])
+def test_evaluate_with_processes(presses: int, tmp_path: Path) -> None:
+    words = ['evaluate', 'sim:all:1-9', '--size', '160x90', '--variants', 'kcf', '--jobs', '2']
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', *words, '--report', 'report'],
+        cwd=tmp_path, env=environment(), start_new_session=True, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        # a child of a shell's background job has it ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    results = tmp_path / 'report' / 'results' / 'kcf'
+    while process.poll() is None and not (results.exists() and list(results.glob('*.json'))):
+        time.sleep(0.05)
+    for _ in range(presses):
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to all processes
+        time.sleep(0.3)
+    out, err = process.communicate(timeout=90)
+    assert process.returncode == 130, err
+    assert 'Traceback' not in err
+    done = len(list(results.glob('*.json')))
+    assert done >= 1
+    if presses == 1:
+        assert 'report:' in out
+        assert (tmp_path / 'report' / 'index.html').stat().st_size > 1000
+        assert 'the same command goes on from here' in err
+
+
+def test_bench_prints_what_it_has(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real, count = speed.SpeedScene.frame, iter(range(1000))
+
+    def stopping(self: Any, index: int) -> Any:
+        if next(count) == 30:
+            signal.raise_signal(signal.SIGINT)
+        return real(self, index)
+
+    monkeypatch.setattr(speed.SpeedScene, 'frame', stopping)
+    monkeypatch.setattr(bench, 'THREADS', ())
+    words = ['bench', '--sizes', '64x64:32,128x128:64,96x96:48', '--frames', '20']
+    assert main([*words, '--variants', 'kcf']) == 130
+    out = capsys.readouterr().out
+    assert '64x64' in out
+    assert '128x128' in out
+    assert '96x96' not in out
+
+
+# -- what is done stays done, but not longer than it holds -------------------------------------
+
+
+def test_results_are_kept_as_long_as_what_makes_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / 'package'
+    shutil.copytree(
+        Path(jobs.rgbd_kcf_tracker.__file__).parent, root,
+        ignore=shutil.ignore_patterns('__pycache__'),
+    )  # fmt: skip
+    jobs.code_digest.cache_clear()
+    before = jobs.code_digest(root)
+    for name, kept in (
+        ('evaluation/datasets/folder.py', False),
+        ('evaluation/datasets/base.py', False),
+        ('evaluation/passes.py', False),
+        ('recordings/textfiles.py', False),
+        ('metric/tracker.py', False),
+        ('geometry.py', False),
+        ('evaluation/plots.py', True),
+        ('cli/track.py', True),
+        ('ros/tracker_node.py', True),
+    ):
+        old = (root / name).read_text()
+        (root / name).write_text(old + '\n# changed\n')
+        jobs.code_digest.cache_clear()
+        assert (jobs.code_digest(root) == before) == kept, name
+        (root / name).write_text(old)
+    for library in (jobs.np, jobs.scipy, jobs.cv2):
+        with monkeypatch.context() as patch:
+            patch.setattr(library, '__version__', '99.0')
+            jobs.code_digest.cache_clear()
+            assert jobs.code_digest(root) != before
+    jobs.code_digest.cache_clear()
