@@ -74,16 +74,29 @@ class Tracker(Protocol):
         ...
 
 
+LARGEST_BOX = 2.0
+"""A first box may be so many times as wide and as high as the image. A target of which a half shows on
+either side is the most that can be meant; what follows is sized by the box, so more is refused."""
+
+
 def require_inside(box: Box, frame: Frame) -> None:
-    """Refuse a first box that shows nothing of the image.
+    """Refuse a first box that shows nothing of the image, or that no image could hold.
+
+    To be called before anything is sized by the box.
 
     Raises:
-        BoxError: where no whole pixel of the box lies inside the frame.
+        BoxError: where no whole pixel of the box lies inside the frame, or where it is more than
+            :data:`LARGEST_BOX` times as wide or as high as the frame.
     """
     inside = box.clipped(frame.width, frame.height)
     if inside is None or inside.width < 1 or inside.height < 1:
-        raise BoxError(
-            f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} lies outside the '
-            f'{frame.width}x{frame.height} image: '
-            'give x,y,width,height in pixels of the colour image'
-        )
+        wrong = 'lies outside'
+    elif box.width > LARGEST_BOX * frame.width or box.height > LARGEST_BOX * frame.height:
+        wrong = 'is far larger than'
+    else:
+        return
+    raise BoxError(
+        f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} {wrong} the '
+        f'{frame.width}x{frame.height} image: '
+        'give x,y,width,height in pixels of the colour image'
+    )
