@@ -75,8 +75,9 @@ class Tracker(Protocol):
 
 
 LARGEST_BOX = 2.0
-"""A first box may be so many times as wide and as high as the image. A target of which a half shows on
-either side is the most that can be meant; what follows is sized by the box, so more is refused."""
+"""A first box may be so many times as wide and as high as the image.
+
+That is a target of which half shows. What follows is sized by the box, so more is refused."""
 
 
 def require_inside(box: Box, frame: Frame) -> None:

@@ -23,11 +23,14 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_rig import Rig, overrides, running_node, scene, tracker_process
+from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.generated import outdated
 from rgbd_kcf_tracker.bench.rig import resident_mb
 from rgbd_kcf_tracker.live.settings import READ_ONLY, all_parameters
+from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
+from rgbd_kcf_tracker.track import TrackState
 
 pytestmark = pytest.mark.ros
 
@@ -148,6 +151,50 @@ def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
     assert resident_mb(os.getpid()) - memory < 20
     node.destroy_node()
     rclpy.shutdown(context=context)
+
+
+def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate = threading.Event()
+    monkeypatch.setattr(Worker.stop, '__defaults__', (0.2,))
+    with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
+        rig.play(range(3))
+        session, update = node._session, node._session._tracker.update
+        node._session._tracker.update = lambda frame: gate.wait(30) and update(frame)
+        rig.send(3)
+        time.sleep(0.2)
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert set_parameter(rig, 'variant', 'kcf').successful
+        # Its image is still in work, with the session that a new worker would use.
+        assert not change(rig, Transition.TRANSITION_ACTIVATE)
+        assert state(rig) == State.PRIMARY_STATE_INACTIVE
+        assert change(rig, Transition.TRANSITION_CLEANUP)
+        assert change(rig, Transition.TRANSITION_CONFIGURE)
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        assert node._session is not session
+        rig.await_listener(node)
+        rig.play(range(6, 9))
+        gate.set()
+        rig.play(range(9, 12))
+        assert rig.box() is not None
+        assert node._session.variant == 'kcf'
+
+
+def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
+        rig.play(range(2))
+        node._session._tracker.update = lambda frame: time.sleep(0.3) or node._session.track
+        rig.send(2)
+        time.sleep(0.1)  # in work
+        assert set_parameter(rig, 'variant', 'kcf').successful
+        client = rig.node.create_client(Trigger, '/tracker/reset')
+        assert client.wait_for_service(20)
+        client.call_async(Trigger.Request())
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        assert node._session.variant == 'kcf'
+        assert node._session.track.state is TrackState.IDLE
 
 
 def test_parameters_are_described(rig: Rig) -> None:

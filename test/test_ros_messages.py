@@ -271,7 +271,7 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     answers: list[Track] = []
     made._publishers.publish = lambda header, track, size: answers.append(track)
     image = image_message(HEADER, np.zeros((60, 80, 3), np.uint8), 'bgr8')
-    made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), lambda _: Box(20, 20, 20, 20))
+    made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), Box(20, 20, 20, 20))
 
     def broken(_: Frame) -> Track:
         raise ZeroDivisionError('broken')

@@ -151,16 +151,14 @@ class Processor:
 
     def choose(self, choice: Choice, oldest_s: float) -> None:
         """Start on the newest image, or the next one where the newest is old or shows nothing."""
-        if self._last is not None:
-            capture, time_ns = self._last
-            if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
-                self.session.choose(choice)  # so that depth is decoded for it
-                frame = self.frame(capture, time_ns)
-                if frame is not None:
-                    self.session.start(frame, choice)
-                    self.session.choose(None)
-                    return
         self.session.choose(choice)
+        if self._last is None or not self.session.due:
+            return
+        capture, time_ns = self._last
+        if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
+            frame = self.frame(capture, time_ns)
+            if frame is not None:
+                self.session.start_as_asked(frame)
 
     def frame(self, capture: Capture, time_ns: int) -> Frame | None:
         """The pair as a frame; without depth where that cannot be used; None without a picture."""

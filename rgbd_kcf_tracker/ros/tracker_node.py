@@ -143,6 +143,12 @@ class TrackerNode(LifecycleNode):
         """Listen to the camera and start the worker."""
         if self._processor is None or self._requests is None:
             return FAILURE
+        if self._worker is not None and not self._worker.ended:
+            self.get_logger().error(
+                'cannot activate: the tracker is still busy with an image from before; try again, '
+                'or clean up'
+            )
+            return FAILURE
         settings = self._settings
         try:
             patient = settings.queue_policy == ALL
@@ -204,9 +210,8 @@ class TrackerNode(LifecycleNode):
         if self._inputs is not None:
             self._inputs.destroy()
             self._inputs = None
-        if self._worker is not None:
-            self._worker.stop()
-            self._worker = None
+        if self._worker is not None and not self._worker.stop():
+            self.get_logger().error('the tracker is still busy with an image: left behind')
         self._intake = None
 
     def _take_down(self) -> None:
@@ -216,7 +221,8 @@ class TrackerNode(LifecycleNode):
         if self._reset_service is not None:
             self.destroy_service(self._reset_service)
             self._reset_service = None
-        self._session = self._processor = self._requests = None
+        # A worker that is still busy keeps the session that it has; the next one is another.
+        self._session = self._processor = self._requests = self._worker = None
 
     # --- receiving: store only -------------------------------------------------------------------
 
@@ -269,11 +275,11 @@ class TrackerNode(LifecycleNode):
         session = self._session
         if session is not None and any(n == 'variant' or '.' in n for n in names):
             parameters = self._parameters_server.variant_parameters(variant)
-            self._in_worker(lambda: session.configure(variant, parameters))
+            self._in_worker('configure', lambda: session.configure(variant, parameters))
 
-    def _in_worker(self, function: Callable[[], None]) -> None:
+    def _in_worker(self, kind: str, function: Callable[[], None]) -> None:
         if self._worker is not None:
-            self._worker.call(function)
+            self._worker.call(kind, function)
         else:
             function()
 
@@ -318,4 +324,5 @@ class TrackerNode(LifecycleNode):
             depth_publishers=publishers[DEPTH],
             stale_after=self._settings.stale_after,
             uses_depth=VARIANTS[session.variant].uses_depth,
+            depth_fault=self._intake.fit.fault if self._intake is not None else '',
         )
