@@ -61,7 +61,7 @@ class Tracker(Protocol):
         Returns the track of this first frame, which is the given box.
 
         Raises:
-            BoxError: where the box lies wholly outside the image.
+            BoxError: where the box lies outside the image; see :func:`require_inside`.
         """
         ...
 
@@ -74,30 +74,27 @@ class Tracker(Protocol):
         ...
 
 
-LARGEST_BOX = 2.0
-"""A first box may be so many times as wide and as high as the image.
-
-That is a target of which half shows. What follows is sized by the box, so more is refused."""
-
-
 def require_inside(box: Box, frame: Frame) -> None:
-    """Refuse a first box that shows nothing of the image, or that no image could hold.
+    """Refuse a first box that shows nothing of the image, or reaches absurdly far out of it.
 
-    To be called before anything is sized by the box.
+    This is the one bound on the sizes of what a tracker makes for its target: a box that passes is
+    at least a pixel and at most three images wide and high.
 
     Raises:
-        BoxError: where no whole pixel of the box lies inside the frame, or where it is more than
-            :data:`LARGEST_BOX` times as wide or as high as the frame.
+        BoxError: where no whole pixel of the box lies inside the frame, or it reaches further out
+            of the image than that is wide or high.
     """
     inside = box.clipped(frame.width, frame.height)
     if inside is None or inside.width < 1 or inside.height < 1:
-        wrong = 'lies outside'
-    elif box.width > LARGEST_BOX * frame.width or box.height > LARGEST_BOX * frame.height:
-        wrong = 'is far larger than'
-    else:
-        return
-    raise BoxError(
-        f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} {wrong} the '
-        f'{frame.width}x{frame.height} image: '
-        'give x,y,width,height in pixels of the colour image'
+        raise BoxError(_refusal(box, frame, 'lies outside'))
+    left, top = -box.x, -box.y
+    right, bottom = box.right - frame.width, box.bottom - frame.height
+    if max(left, right) > frame.width or max(top, bottom) > frame.height:
+        raise BoxError(_refusal(box, frame, 'reaches too far out of'))
+
+
+def _refusal(box: Box, frame: Frame, what: str) -> str:
+    return (
+        f'box {box.x:g},{box.y:g},{box.width:g},{box.height:g} {what} the '
+        f'{frame.width}x{frame.height} image: give x,y,width,height in pixels of the colour image'
     )

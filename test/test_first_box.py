@@ -12,7 +12,7 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, create_tracker
 from rgbd_kcf_tracker.errors import BoxError
-from rgbd_kcf_tracker.track import LARGEST_BOX, require_inside
+from rgbd_kcf_tracker.track import require_inside
 from rgbd_kcf_tracker.variants import VARIANTS
 
 WIDTH, HEIGHT = 320, 240
@@ -43,10 +43,10 @@ FRAMES = [frame(index) for index in range(3)]
     ],
     ids=str,
 )
-def test_a_box_far_larger_than_the_image_is_refused(variant: str, box: Box) -> None:
+def test_a_box_that_reaches_far_out_of_the_image_is_refused(variant: str, box: Box) -> None:
     tracemalloc.start()
     try:
-        with pytest.raises(BoxError, match='far larger than the 320x240 image'):
+        with pytest.raises(BoxError, match='too far out of the 320x240 image'):
             create_tracker(variant).start(FRAMES[0], box)
         peak = tracemalloc.get_traced_memory()[1]
     finally:
@@ -58,11 +58,11 @@ def test_a_box_far_larger_than_the_image_is_refused(variant: str, box: Box) -> N
 @pytest.mark.parametrize(
     'box',
     [
-        Box(-WIDTH / 2, -HEIGHT / 2, LARGEST_BOX * WIDTH, LARGEST_BOX * HEIGHT),
-        Box(100, -HEIGHT / 2, 1, LARGEST_BOX * HEIGHT),
-        Box(-WIDTH / 2, 100, LARGEST_BOX * WIDTH, 1),
+        Box(-WIDTH / 2, -HEIGHT / 2, 2 * WIDTH, 2 * HEIGHT),
+        Box(100, -HEIGHT / 2, 1, 2 * HEIGHT),
+        Box(-WIDTH / 2, 100, 2 * WIDTH, 1),
         Box(0, 0, 1, 1),
-        Box(WIDTH - 1, HEIGHT - 1, 600, 400),
+        Box(WIDTH - 1, HEIGHT - 1, WIDTH, HEIGHT),
     ],
     ids=str,
 )
@@ -79,9 +79,10 @@ def test_any_other_box_is_taken_and_costs_no_more_than_the_image(variant: str, b
     assert peak < 128 << 20
 
 
-def test_the_limit_is_of_the_sides_alone() -> None:
-    require_inside(Box(-10, -10, LARGEST_BOX * WIDTH, 20), FRAMES[0])
-    with pytest.raises(BoxError, match='far larger'):
-        require_inside(Box(-10, -10, LARGEST_BOX * WIDTH + 1, 20), FRAMES[0])
+def test_the_limit_is_an_image_on_either_side() -> None:
+    require_inside(Box(-WIDTH, -10, 3 * WIDTH, 20), FRAMES[0])
+    for box in (Box(-WIDTH - 1, 0, WIDTH + 50, 20), Box(0, 10, 20, 2 * HEIGHT)):
+        with pytest.raises(BoxError, match='too far out'):
+            require_inside(box, FRAMES[0])
     with pytest.raises(BoxError, match='outside'):
         require_inside(Box(CAST, 0, CAST, 20), FRAMES[0])

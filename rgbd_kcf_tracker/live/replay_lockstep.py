@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
+from rgbd_kcf_tracker.live.stopping import Stopping
 from rgbd_kcf_tracker.recordings.pairing import (
     DEFAULT_TOLERANCE_S,
     Pair,
@@ -94,7 +95,7 @@ class Answers:
                 while len(self._early) > REMEMBERED:
                     del self._early[next(iter(self._early))]
 
-    def wait(self, timeout_s: float, stop: threading.Event) -> bool:
+    def wait(self, timeout_s: float, stop: Stopping) -> bool:
         """Wait until everything due is answered; False after ``timeout_s`` or when stopped.
 
         Also waits, as long at most, while too much is under way that may be due later.
@@ -110,7 +111,7 @@ class Answers:
                 self._changed.wait(0.1)
         return True
 
-    def drain(self, quiet_s: float, stop: threading.Event) -> bool:
+    def drain(self, quiet_s: float, stop: Stopping) -> bool:
         """Wait as long as answers still come; False where some are missing after ``quiet_s``."""
         seen = -1
         while seen != len(self.latencies_s) and not stop.is_set():

@@ -8,7 +8,6 @@ Plain Python, one thread: the node's worker calls it; tests call it directly.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -26,8 +25,9 @@ Choice = Callable[[Frame], 'Box | None']
 
 IDLE = Track(None, TrackState.IDLE)
 REQUESTS_SHARE = 0.2
-"""Share of the time that may go into starting on targets, so that a storm of requests leaves the
-rest to the images."""
+"""Share of the time that may go into starting on targets: a storm of requests leaves the rest."""
+REQUESTS_CREDIT_S = 0.3
+"""So much of it is saved up: a few requests in a row are met at once."""
 
 
 _warm: set[str] = set()
@@ -74,7 +74,7 @@ class Session:
         self._auto: Choice | None = None
         self._auto_again = False
         self._now = now
-        self._next_start = -math.inf
+        self._credit_s, self._credited = REQUESTS_CREDIT_S, now()
         self.track = IDLE
 
     @property
@@ -95,7 +95,12 @@ class Session:
     @property
     def due(self) -> bool:
         """Whether a target was asked for, and its turn has come."""
-        return self._choice is not None and self._now() >= self._next_start
+        if self._choice is None:
+            return False
+        now = self._now()
+        saved = self._credit_s + (now - self._credited) * REQUESTS_SHARE
+        self._credit_s, self._credited = min(saved, REQUESTS_CREDIT_S), now
+        return self._credit_s > 0
 
     def choose_by_itself(self, auto: Choice | None, again: bool = False) -> None:
         """Ask ``auto`` for a target whenever there is none.
@@ -135,8 +140,7 @@ class Session:
             self._report(str(error))
             return False
         finally:
-            ended = self._now()
-            self._next_start = ended + (ended - begun) * (1 / REQUESTS_SHARE - 1)
+            self._credit_s -= self._now() - begun
 
     def start(self, frame: Frame, box: Box) -> bool:
         """Take this target; where that fails, the one that is followed is kept, and it is said."""

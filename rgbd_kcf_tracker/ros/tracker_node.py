@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
@@ -31,7 +32,7 @@ from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
-from rgbd_kcf_tracker.ros.parameters import ParameterServer
+from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.publishers import TrackPublishers
 from rgbd_kcf_tracker.ros.requests import Requests
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
@@ -50,10 +51,13 @@ class TrackerNode(LifecycleNode):
     Args:
         name: of the node.
         options: passed on to rclpy's node (``parameter_overrides``, ``namespace``, ...).
+
+    Raises:
+        ParameterError: where it is started with an unknown parameter or a value out of range.
     """
 
     def __init__(self, name: str = 'tracker', **options: Any) -> None:
-        super().__init__(name, **options)
+        super().__init__(name, **DECLARE_OVERRIDES, **options)
         self.statistics = Statistics()
         self._session: Session | None = None
         self._processor: Processor | None = None
@@ -64,10 +68,11 @@ class TrackerNode(LifecycleNode):
         self._inputs: Subscriptions | None = None
         self._reset_service: Any = None
         self._logged: dict[str, float] = {}
-        self._parameters_server = ParameterServer(self, self._parameters_changed)
-        for problem in self._parameters_server.problems:
-            self.statistics.error('bad_parameters', problem)
-            self.get_logger().error(problem)
+        try:
+            self._parameters_server = ParameterServer(self, self._parameters_changed)
+        except RgbdKcfError:
+            super().destroy_node()
+            raise
         self._settings = self._parameters_server.node_parameters()
         # Diagnostics speak in every lifecycle state, so theirs is a plain publisher.
         self._diagnostics = Node.create_publisher(self, DiagnosticArray, '/diagnostics', 10)
@@ -83,7 +88,7 @@ class TrackerNode(LifecycleNode):
 
     def _answer_impossible_transitions(self) -> None:
         """Refuse a transition that does not fit the state; rclpy raises and leaves no answer."""
-        service = self._service_change_state
+        service = self._own_service(ChangeState)
         change = service.callback
 
         def guarded(request: Any, response: Any) -> Any:
@@ -96,15 +101,27 @@ class TrackerNode(LifecycleNode):
 
         service.callback = guarded
 
+    def _lifecycle(self) -> str:
+        """Label of the lifecycle state, as anybody may ask for it: rclpy's only public way."""
+        answer = self._own_service(GetState).callback(GetState.Request(), GetState.Response())
+        return str(answer.current_state.label)
+
+    def _own_service(self, kind: Any) -> Any:
+        return next(service for service in self.services if service.srv_type is kind)
+
     @property
     def settings(self) -> NodeParameters:
         """The node's own parameters as they stand."""
         return self._settings
 
     def autostart(self) -> None:
-        """Configure and activate without a lifecycle manager."""
-        if self.trigger_configure() == SUCCESS:
-            self.trigger_activate()
+        """Configure and activate without a lifecycle manager.
+
+        Raises:
+            RgbdKcfError: where that fails.
+        """
+        if self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS:
+            raise RgbdKcfError(self.statistics.snapshot().last_error)
 
     # --- lifecycle -------------------------------------------------------------------------------
 
@@ -134,7 +151,7 @@ class TrackerNode(LifecycleNode):
             self._reset_service = self.create_service(Trigger, '~/reset', self._requests.reset)
             self._requests.from_parameters(frozenset({'init_box', 'auto_init'}))
         except Exception as error:  # rclpy would hide it
-            self.get_logger().error(f'cannot configure: {error}')
+            self._cannot(f'cannot configure: {error}')
             self._take_down()
             return FAILURE
         return super().on_configure(state)
@@ -144,7 +161,7 @@ class TrackerNode(LifecycleNode):
         if self._processor is None or self._requests is None:
             return FAILURE
         if self._worker is not None and not self._worker.ended:
-            self.get_logger().error(
+            self._cannot(
                 'cannot activate: the tracker is still busy with an image from before; try again, '
                 'or clean up'
             )
@@ -172,7 +189,7 @@ class TrackerNode(LifecycleNode):
                 init_point=self._requests.init_point,
             )
         except Exception as error:  # rclpy would hide it
-            self.get_logger().error(f'cannot activate: {error}')
+            self._cannot(f'cannot activate: {error}')
             self._stop_listening()
             return FAILURE
         self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
@@ -288,6 +305,10 @@ class TrackerNode(LifecycleNode):
     def _worker_failed(self, error: Exception) -> None:
         self._fault('internal_errors', f'internal error: {type(error).__name__}: {error}')
 
+    def _cannot(self, text: str) -> None:
+        self.statistics.error('failed_transitions', text)
+        self.get_logger().error(text)
+
     def _fault(self, kind: str, text: str) -> None:
         """Count a fault and say it, each kind every few seconds at most."""
         self.statistics.error(kind, text)
@@ -304,7 +325,7 @@ class TrackerNode(LifecycleNode):
 
     def _state(self) -> NodeState:
         name = self.get_fully_qualified_name()
-        lifecycle = self._state_machine.current_state[1]
+        lifecycle = self._lifecycle()
         session, wired = self._session, self._inputs
         if session is None:
             return NodeState(name, lifecycle)
