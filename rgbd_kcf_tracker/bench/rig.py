@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from rgbd_kcf_tracker.bench.camera import NAMESPACE
-from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE, profile_path
+from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE, fitting_profile
 
 
 def environment(with_profile: bool = True) -> dict[str, str]:
@@ -25,7 +25,7 @@ def environment(with_profile: bool = True) -> dict[str, str]:
     variables = dict(os.environ)
     variables.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     variables.setdefault('ROS_LOG_DIR', tempfile.gettempdir())
-    path = profile_path()
+    path = fitting_profile()
     if with_profile and path is not None:
         variables.setdefault(PROFILE_VARIABLE, str(path))
     return variables

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
@@ -77,6 +77,23 @@ class Publishers(Protocol):
         ...
 
 
+SHORTEST_LOOP = 10
+"""Images between two jumps back that make a loop; fewer are a fault of the stamps."""
+
+
+def in_picture(track: Track, frame: Frame) -> Track:
+    """The track with the part of its box that lies in the picture; hidden where no part does."""
+    box = track.box
+    if box is None:
+        return track
+    shown = box.clipped(frame.width, frame.height)
+    if shown == box:
+        return track
+    if shown is None:
+        return replace(track, box=None, state=TrackState.OCCLUDED, score=0.0)
+    return replace(track, box=shown)
+
+
 class Processor:
     """Decodes what is needed, asks the session, publishes, counts.
 
@@ -108,6 +125,7 @@ class Processor:
         self._timeline = Timeline()
         self._last: tuple[Capture, int] | None = None
         self._frame_id: str | None = None
+        self._restarts = self._steady = 0
         self.on_restart: Callable[[], None] | None = None
         self._decode_color: Callable[[Any], ColorImage] = (
             decode_color if color_transport == RAW else decode_compressed_color
@@ -131,7 +149,7 @@ class Processor:
             if frame is not None:
                 size = frame.width, frame.height
                 try:
-                    track = session.process(frame)
+                    track = in_picture(session.process(frame), frame)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
@@ -204,9 +222,20 @@ class Processor:
         return depth
 
     def _notice(self, header: Any, moment: Moment) -> None:
+        self._steady += 1
         if moment.jumped:
-            self._fault('time_jumps', 'stamps jumped: a looping bag, or a camera clock not set?')
-            if moment.restarted and self.on_restart is not None:
+            # A bag that loops is no fault: it is said once, and counted.
+            loop = moment.restarted and self._restarts > 0 and self._steady >= SHORTEST_LOOP
+            if not loop:
+                self._fault(
+                    'time_jumps',
+                    'stamps jumped: a looping bag (then this is said once), a camera clock that '
+                    'was set, or two publishers?',
+                )
+        if moment.restarted:
+            self._restarts, self._steady = self._restarts + 1, 0
+            self._statistics.set('restarts', self._restarts)
+            if self.on_restart is not None:
                 self.on_restart()
         if self._frame_id is not None and header.frame_id != self._frame_id:
             self._fault(

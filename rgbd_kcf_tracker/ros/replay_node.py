@@ -129,7 +129,7 @@ class ReplayNode(Node):
                 if parameters.lockstep:
                     raise ParameterError(
                         f'nobody subscribes to {topics} and answers on {parameters.answer_topic}: '
-                        'start the tracker with its inputs remapped to these topics'
+                        + (self._answer_hint() or 'start the tracker with its inputs remapped')
                     )
                 if parameters.wait_for_subscribers:
                     self.get_logger().warning(f'nobody subscribes to {topics}: playing anyway')
@@ -140,6 +140,18 @@ class ReplayNode(Node):
             if stop.wait(0.02):
                 return
         stop.wait(SETTLE_S)
+
+    def _answer_hint(self) -> str:
+        """Where trackers of another name or namespace answer, if that is not the answer_topic."""
+        if self.count_publishers(self.parameters.answer_topic):
+            return ''
+        kind = 'geometry_msgs/msg/PolygonStamped'
+        heard = [
+            name
+            for name, types in self.get_topic_names_and_types()
+            if kind in types and name.endswith('/box') and self.count_publishers(name)
+        ]
+        return f'set answer_topic, for there is {", ".join(sorted(heard))}' if heard else ''
 
     def _play(self, source: ReplaySource, answers: Answers, stop: Stopping) -> None:
         parameters = self.parameters
@@ -176,6 +188,9 @@ class ReplayNode(Node):
         answers.give_up()
         figures = figures_of(player, answers, seconds)
         self.get_logger().info(summary(figures))
+        hint = self._answer_hint() if parameters.answer_topic and not figures['answers'] else ''
+        if hint:
+            self.get_logger().warning(f'no answers on {parameters.answer_topic}: {hint}')
         if parameters.report:
             write_report(Path(parameters.report), figures)
 
