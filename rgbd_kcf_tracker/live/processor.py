@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
-from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Moment, Timeline
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
@@ -136,6 +136,7 @@ class Processor:
 
     def __call__(self, capture: Capture) -> None:
         """Answer one pair: there is a result for every pair, whatever is wrong with it."""
+        begun = time.monotonic_ns()
         header = capture.color.header
         moment = self._timeline.advance(stamp_of(capture.color), capture.arrival_ns)
         self._notice(header, moment)
@@ -143,8 +144,10 @@ class Processor:
         frame: Frame | None = None
         size: tuple[int, int] | None = None
         track = IDLE
+        decoded = begun
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
+            decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
                 size = frame.width, frame.height
@@ -154,10 +157,22 @@ class Processor:
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
+        tracked = time.monotonic_ns()
         self._publishers.publish(header, track, size)
-        latency = self._now_ns() - stamp_of(capture.color)
-        work = time.monotonic_ns() - capture.arrival_ns
-        self._statistics.processed(latency / 1e6, work / 1e6)
+        published = time.monotonic_ns()
+        latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
+        work = (published - capture.arrival_ns) / 1e6
+        self._statistics.processed(
+            Times(
+                latency=latency,
+                work=work,
+                transport=latency - work,
+                waiting=(begun - capture.arrival_ns) / 1e6,
+                decode=(decoded - begun) / 1e6,
+                track=(tracked - decoded) / 1e6,
+                publish=(published - tracked) / 1e6,
+            )
+        )
         self._last = capture, moment.time_ns
         if frame is not None:
             self._publishers.publish_extras(header, track, frame, frame.intrinsics)

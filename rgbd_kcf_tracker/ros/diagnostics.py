@@ -112,7 +112,7 @@ def diagnostics_message(stamp: Time, state: NodeState, snapshot: Snapshot) -> Di
         'rate_hz': f'{snapshot.recent.get("processed", 0) / snapshot.seconds:.1f}',
         'input_rate_hz': f'{snapshot.recent.get("color_received", 0) / snapshot.seconds:.1f}',
     }
-    for what, summary in (('latency', snapshot.latency_ms), ('work', snapshot.work_ms)):
+    for what, summary in snapshot.times_ms.items():
         for name, value in zip(LATENCY_NAMES, summary, strict=False):
             values[f'{what}_{name}_ms'] = f'{value:.2f}'
     values |= {name: str(number) for name, number in sorted(snapshot.counts.items())}

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from rclpy.executors import Executor
 
     from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+HOW_TO_GET = (
+    'which reads bags and is not in apt: python3 -m pip install --user --break-system-packages '
+    'rosbags mcap mcap-ros2-support (docs/install.md)'
+)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -34,7 +38,13 @@ def main(arguments: list[str] | None = None) -> int:
         return 0
     keep_large_blocks()  # before NumPy and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings
-    from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+    try:
+        from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+    except ModuleNotFoundError as error:
+        if error.name not in ('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'):
+            raise
+        print(f'replay: {error.name} is missing, {HOW_TO_GET}', file=sys.stderr)
+        return 2
 
     def live(executor: Executor, node: ReplayNode) -> None:
         ended = threading.Event()

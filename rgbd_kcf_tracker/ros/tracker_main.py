@@ -13,6 +13,10 @@ TYPE_CHECKING = False  # that of typing costs an import
 if TYPE_CHECKING:
     from rclpy.executors import Executor
 
+SWITCH_INTERVAL_S = 0.0005
+"""Seconds. The executor's thread and the worker's wait for each other's hold on the interpreter: with
+Python's default, ten times as long (docs/live.md)."""
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the tracker node until SIGINT or SIGTERM."""
@@ -28,6 +32,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     if asks_for_help(parser, arguments):
         return 0
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     keep_large_blocks()  # before NumPy, OpenCV and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings
     from rgbd_kcf_tracker.ros.tracker_node import TrackerNode

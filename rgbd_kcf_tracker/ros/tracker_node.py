@@ -33,7 +33,7 @@ from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
-from rgbd_kcf_tracker.ros.publishers import TrackPublishers
+from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
 from rgbd_kcf_tracker.ros.requests import Requests
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
 from rgbd_kcf_tracker.track import TrackState
@@ -75,7 +75,9 @@ class TrackerNode(LifecycleNode):
             raise
         self._settings = self._parameters_server.node_parameters()
         # Diagnostics speak in every lifecycle state, so theirs is a plain publisher.
-        self._diagnostics = Node.create_publisher(self, DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = Node.create_publisher(
+            self, DiagnosticArray, '/diagnostics', 10, event_callbacks=NO_EVENTS
+        )
         # Timers on the node's own clock would stand still while recorded time does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics_timer = self.create_timer(
