@@ -8,6 +8,7 @@ there when it builds with ``--symlink-install``.
 """
 
 import re
+import sys
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -62,6 +63,13 @@ def shared(folder: str, *patterns: str) -> tuple[str, list[str]]:
     return f'share/{NAME}/{folder}', [str(p.relative_to(HERE)) for p in files]
 
 
+# colcon puts the executables there by itself (setup.cfg); pip puts them into bin alone.
+FOR_ROS2_RUN = (
+    [(f'lib/{NAME}', [f'resource/lib/{name}' for name in ('tracker', 'replay', 'rgbd-kcf')])]
+    if 'bdist_wheel' in sys.argv
+    else []
+)
+
 setup(
     name=NAME,
     version=version(),
@@ -87,6 +95,7 @@ setup(
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css']},
     data_files=[
+        *FOR_ROS2_RUN,
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
         shared('config', '*.yaml', '*.xml', '*.rviz'),

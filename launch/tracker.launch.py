@@ -19,6 +19,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
 from rgbd_kcf_tracker.live.camera_profiles import camera_profile, load_cameras
+from rgbd_kcf_tracker.live.settings import RAW
 
 CONFIG = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config')
 ARGUMENTS = {
@@ -37,8 +38,9 @@ ARGUMENTS = {
     'name': ('tracker', 'Name of the node.'),
     'use_sim_time': ('false', 'Take the time from /clock.'),
     'fastdds_profile': (
-        str(CONFIG / 'fastdds.xml'),
-        'Transport settings for images, for Fast DDS; empty to leave them alone.',
+        '',
+        "A Fast DDS profile; empty for the environment's, or else the package's own, which the "
+        'node fits to the size of /dev/shm.',
     ),
     'log_level': ('info', 'debug, info, warn, error.'),
 }
@@ -60,8 +62,9 @@ def start(context: LaunchContext) -> list:
         'use_sim_time': is_true(given['use_sim_time']),
         'autostart': is_true(given['autostart']),
     }
-    if is_true(given['compressed']):
-        parameters |= profile.transports(compressed=True)
+    # Raw is not said, so that a file of parameters may say otherwise.
+    transports = profile.transports(is_true(given['compressed']))
+    parameters |= {name: how for name, how in transports.items() if how != RAW}
     if given['variant']:
         parameters['variant'] = given['variant']
     if given['init_box']:

@@ -9,8 +9,10 @@ against stand-ins that only remember what they were given.
 
 from __future__ import annotations
 
+import re
 import runpy
 import sys
+from dataclasses import fields
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -19,7 +21,7 @@ import pytest
 import yaml
 
 from rgbd_kcf_tracker.errors import ParameterError
-from rgbd_kcf_tracker.live.camera_profiles import camera_profile, load_cameras
+from rgbd_kcf_tracker.live.camera_profiles import CameraProfile, camera_profile, load_cameras
 from rgbd_kcf_tracker.live.settings import NodeParameters
 
 PROJECT = Path(__file__).resolve().parent.parent
@@ -106,7 +108,6 @@ def test_arguments_reach_the_node(launch_modules: None) -> None:
         use_sim_time='true',
         namespace='left',
         name='watcher',
-        fastdds_profile='',
     )
     assert dict(node.named['remappings'])['depth/image'] == '/my/depth'
     assert dict(node.named['remappings'])['color/image'] == '/camera/color/image_raw'
@@ -116,10 +117,30 @@ def test_arguments_reach_the_node(launch_modules: None) -> None:
     assert (parameters['auto_init'], parameters['autostart']) == (True, False)
     assert parameters['use_sim_time'] is True
     assert (node.named['namespace'], node.named['name']) == ('left', 'watcher')
+    # The node itself sizes the transport to the machine: no variable stands in its way.
     assert len(actions) == 1
-    _, with_profile = start_tracker()
-    assert with_profile[0].values[0] == 'FASTRTPS_DEFAULT_PROFILES_FILE'
-    assert Path(with_profile[0].values[1]).is_file()
+    _, with_profile = start_tracker(fastdds_profile='/my.xml')
+    assert with_profile[0].values == ('FASTRTPS_DEFAULT_PROFILES_FILE', '/my.xml')
+
+
+def test_a_profile_may_say_how_its_images_arrive(launch_modules: None, tmp_path: Path) -> None:
+    path = tmp_path / 'cameras.yaml'
+    path.write_text(
+        'far: {color: /c, depth: /d, info: /i, color_transport: compressed, '
+        'depth_transport: compressedDepth}',
+        encoding='utf-8',
+    )
+    node, _ = start_tracker(camera='far', cameras_file=str(path))
+    parameters = node.named['parameters'][1]
+    assert parameters['color_transport'] == 'compressed'
+    assert parameters['depth_transport'] == 'compressedDepth'
+
+
+def test_what_the_shipped_file_documents_is_taken(tmp_path: Path) -> None:
+    head = CAMERAS.read_text(encoding='utf-8').partition('kinect2_hd:')[0]
+    names = re.findall(r'^#   ([a-z_]+(?:, [a-z_]+)*)  ', head, re.MULTILINE)
+    keys = {key for group in names for key in group.split(', ')}
+    assert keys | {'description'} == {field.name for field in fields(CameraProfile)}
 
 
 def test_arguments_are_declared_with_their_meaning(launch_modules: None) -> None:
@@ -153,6 +174,11 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
         ('mine: {color: /a, depth: /b}', 'camera mine has no info'),
         ('mine: {color: /a, depth: /b, info: /c, colour: /d}', 'unknown colour'),
         ('mine: [', 'cannot be read'),
+        ('mine: /a', 'names with entries'),
+        (
+            'mine: {color: /a, depth: /b, info: /c, color_transport: theora}',
+            'color_transport is .theora.: choose one of raw, compressed',
+        ),
     ],
 )
 def test_bad_profiles_say_what_is_wrong(tmp_path: Path, text: str, words: str) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import time
 from dataclasses import replace
@@ -16,7 +17,10 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
+import rclpy
 import replay_rig as rig
+from geometry_msgs.msg import PolygonStamped
+from rclpy.node import Node
 
 from rgbd_kcf_tracker import create_tracker
 from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
@@ -203,6 +207,25 @@ def test_lockstep_without_a_tracker_says_what_is_missing(bag: Path, tmp_path: Pa
     assert status == 2
     assert 'nobody subscribes to /color/image, /depth/image' in output
     assert '/tracker/box' in output
+
+
+@pytest.mark.parametrize('lockstep', [True, False])
+def test_trackers_of_another_name_are_pointed_out(
+    bag: Path, tmp_path: Path, lockstep: bool
+) -> None:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
+    node = Node('watcher', namespace='/left', context=context)
+    node.create_publisher(PolygonStamped, '~/box', 10)
+    try:
+        status, output = rig.run_replay(
+            tmp_path, bag=str(bag), rate=0.0, lockstep=lockstep, wait_for_subscribers=5.0
+        )
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+    assert status == (2 if lockstep else 0)
+    assert 'set answer_topic, for there is /left/watcher/box' in output
 
 
 @pytest.mark.parametrize(

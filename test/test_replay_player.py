@@ -13,10 +13,11 @@ import pytest
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.live.prefetch import prefetched
-from rgbd_kcf_tracker.live.replay_lockstep import Answers
+from rgbd_kcf_tracker.live.replay_lockstep import AHEAD, Answers
 from rgbd_kcf_tracker.live.replay_message import Message, Role
 from rgbd_kcf_tracker.live.replay_pacing import Pacer
 from rgbd_kcf_tracker.live.replay_player import Player
+from rgbd_kcf_tracker.recordings.pairing import patient_pairer
 
 MS = 1_000_000
 
@@ -195,6 +196,56 @@ def test_lockstep_never_runs_ahead_of_the_tracker(skew_ms: int) -> None:
     assert player.play(recording(10, skew_ms=skew_ms), threading.Event())
     assert answers.pairs == len(answers.latencies_s) == 10
     assert most <= (1 if skew_ms == 0 else 2)
+
+
+def test_depth_far_behind_is_paired_as_the_tracker_pairs_it() -> None:
+    """Depth 600 ms late: the tracker waits for it, and so must lock-step."""
+    answers = Answers(has_depth=True)
+    tracker = patient_pairer()
+    stamps = range(0, 2000 * MS, 33 * MS)
+    messages = [Message('/color', at, b'', Role.COLOR, at) for at in stamps]
+    messages += [Message('/depth', at + 600 * MS, b'', Role.DEPTH, at) for at in stamps]
+    paired = []
+    for message in sorted(messages, key=lambda m: m.time_ns):
+        if message.role is Role.COLOR:
+            answers.sent_color(message.stamp_ns)
+            pairs = tracker.add_color(message.stamp_ns, None)
+        else:
+            answers.sent_depth(message.stamp_ns)
+            pairs = tracker.add_depth(message.stamp_ns, None)
+        paired += pairs
+        # What is due is exactly what the tracker has been able to answer.
+        assert set(answers._due) == {pair.stamp_ns for pair in pairs}
+        for pair in pairs:
+            answers.answered(pair.stamp_ns)
+    assert len(answers.latencies_s) == len(paired) == len(stamps)
+    assert all(pair.depth_stamp_ns == pair.stamp_ns for pair in paired)
+
+
+def test_where_depth_has_stopped_lockstep_does_not_run_away() -> None:
+    answers = Answers(has_depth=True)
+    answers.sent_depth(0)
+    under_way, most = 0, 0
+    lock = threading.Lock()
+
+    def answer_later(stamp_ns: int) -> None:
+        nonlocal under_way
+        answers.answered(stamp_ns)
+        with lock:
+            under_way -= 1
+
+    for index in range(200):
+        answers.sent_color(index * 33 * MS)
+        with lock:
+            under_way += 1
+            most = max(most, under_way)
+        # As a tracker that has stopped waiting for depth.
+        threading.Timer(0.02, answer_later, [index * 33 * MS]).start()
+        assert answers.wait(5.0, threading.Event())
+    assert most <= AHEAD + 2
+    answers.sent_all()
+    assert answers.wait(5.0, threading.Event())
+    assert len(answers.latencies_s) == 200
 
 
 def test_lockstep_sends_again_what_was_lost_then_gives_up() -> None:

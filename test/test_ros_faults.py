@@ -10,6 +10,7 @@ part of every test.
 from __future__ import annotations
 
 import array
+import math
 import os
 import threading
 import time
@@ -24,20 +25,25 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 import rclpy
+from geometry_msgs.msg import Point, PointStamped
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_rig import FRAME_ID, HEIGHT, WIDTH, Rig, running_node, scene, stamp_of
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.rig import resident_mb
+from rgbd_kcf_tracker.live.intake import Intake
 from rgbd_kcf_tracker.ros.messages import image_message, stamp_to_ns
 
 pytestmark = pytest.mark.ros
 
 SECOND = 1_000_000_000
-LENGTH = 10_000
-"""Frames between the starts of two tests: five minutes, so that each begins with a jump ahead."""
+LENGTH = 9_990
+"""Frames between the starts of two tests: five minutes, so that each begins with a jump ahead.
+
+106 times the sway, so that the target moves at each start and no picture equals the last."""
 
 
 class Live:
@@ -99,7 +105,13 @@ def live(module_ros_domain: int) -> Iterator[Live]:
     # Every pair counts in most of these tests, so that they need not keep time.
     with running_node(rig, queue_policy='all') as node:
         # The intake of the default policy: it must not wait a second for what was dropped.
-        node._intake._patient = False
+        node._intake = Intake(
+            node.statistics,
+            tolerance_s=node.settings.pair_tolerance,
+            depth_wait_s=node.settings.depth_wait,
+            camera_info_wait_s=node.settings.camera_info_wait,
+            patient=False,
+        )
         yield Live(rig, node)
     rig.close()
 
@@ -117,7 +129,7 @@ def test_frames_dropped(live: Live) -> None:
 def test_depth_late_but_in_time(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     first = live.begin()
     rig, since = live.rig, len(live.rig.boxes)
-    monkeypatch.setattr(live.node._intake, '_wait_ns', 5 * SECOND)
+    monkeypatch.setattr(live.node._intake, '_first_wait_ns', 5 * SECOND)
     for index in range(first, first + 4):
         rig.send_color(index)
         time.sleep(0.1)
@@ -137,6 +149,30 @@ def test_depth_too_late(live: Live) -> None:
     live.answered(since, 2)
     assert live.added('color_without_depth') == 2
     live.goes_on(first + 2)
+
+
+@pytest.mark.parametrize('fault', ['an hour off', '300 ms late'])
+def test_depth_that_never_fits_delays_nothing(live: Live, fault: str) -> None:
+    first = live.begin()
+    rig, since = live.rig, len(live.rig.boxes)
+    waiting: list[int] = []
+    for index in range(first, first + 40):
+        rig.send_color(index)
+        if fault == 'an hour off':
+            rig.send_depth(index, stamp_ns=stamp_of(index) - 3600 * SECOND)
+        elif index >= first + 9:
+            rig.send_depth(index - 9)
+        time.sleep(1 / 30)
+        waiting.append(len(live.node._intake._arrivals))
+    live.answered(since, 40)
+    assert live.added('color_without_depth') == 40
+    assert max(waiting[-20:]) == 0
+    words = 'from those of colour' if fault == 'an hour off' else 'after its colour image'
+    rig.wait(lambda: words in rig.values()['message'], 5.0, words)
+    live.goes_on(first + 40)
+    live.known = live.counts()
+    rig.play(range(first + 43, first + 46))
+    assert live.added('color_without_depth') == 0
 
 
 def test_out_of_order(live: Live) -> None:
@@ -210,8 +246,21 @@ def test_stamps_jump_back(live: Live) -> None:
     for index in range(first, first + 10):
         live.send(index)
     live.answered(since, 10)
-    live.says('time_jumps', 'stamps jumped')
+    assert live.added('restarts') == 1
     live.goes_on(first + 10)
+
+
+def test_a_bag_that_loops_is_no_fault_for_ever(live: Live) -> None:
+    first = live.begin()
+    since = len(live.rig.boxes)
+    for _ in range(4):
+        for index in range(first, first + 40):
+            live.send(index)
+    live.answered(since, 160)
+    # The jump ahead of begin() and those of earlier tests have been; of three loops one is said.
+    assert live.added('restarts') == 3
+    assert live.added('time_jumps') <= 1
+    live.goes_on(first + 40)
 
 
 def test_stamp_far_in_the_future(live: Live) -> None:
@@ -406,6 +455,63 @@ def test_requests_at_any_rate(live: Live) -> None:
     rig.send_init(scene(first + 39)[2])
     time.sleep(0.2)
     live.goes_on(first + 40)
+
+
+def test_boxes_that_nobody_means(live: Live) -> None:
+    """By topic, parameter and click: refused at once, and the target is kept."""
+    first = live.begin()
+    rig = live.rig
+    before = resident_mb(os.getpid())
+    cast = 2**32 - 50
+    for x, y, width, height in (
+        (10, 10, cast, 60),
+        (cast, cast, cast, cast),
+        (10, 10, 60, cast),
+        (10, 10, 0, 0),
+    ):
+        rejected = live.added('rejected_requests')
+        rig.init.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+        time.sleep(0.1)
+        live.goes_on(first)
+        first += 3
+        assert live.added('rejected_requests') == rejected + 1
+    for u, v in ((math.nan, 5.0), (math.inf, -math.inf), (1e300, 1e300), (-1.0, -1.0)):
+        rejected = live.added('rejected_requests')
+        rig.init_point.publish(PointStamped(point=Point(x=u, y=v)))
+        time.sleep(0.1)
+        live.goes_on(first)
+        first += 3
+        assert live.added('rejected_requests') == rejected + 1
+    for text in ('10,10,4294967246,60', '-1e300,0,1e300,60', '1e308,1e308,1,1'):
+        live.node.set_parameters([Parameter('init_box', value=text)])
+        live.goes_on(first)
+        first += 3
+    assert live.added('rejected_requests') == 11
+    assert live.added('internal_errors') == 0
+    assert resident_mb(os.getpid()) - before < 100
+
+
+@pytest.mark.parametrize('rate', [15, 60])
+def test_requests_do_not_starve_images(live: Live, rate: int) -> None:
+    first = live.begin()
+    rig, since = live.rig, len(live.rig.boxes)
+    stop = threading.Event()
+    asked = [scene(first)[2]]
+
+    def ask() -> None:
+        while not stop.wait(1 / rate):
+            rig.send_init(asked[0])
+
+    thread = threading.Thread(target=ask)
+    thread.start()
+    for index in range(first, first + 45):
+        asked[0] = scene(index)[2]
+        rig.send(index)
+        time.sleep(1 / 30)
+    live.answered(since, 45)  # while the requests go on
+    stop.set()
+    thread.join()
+    live.goes_on(first + 45)
 
 
 def test_slow_subscriber(live: Live) -> None:

@@ -75,6 +75,57 @@ def test_without_depth_nothing_waits_after_a_few_misses_until_depth_returns() ->
     assert len(made.depth(message(BASE + 800 * MS), 805 * MS)) == 1
 
 
+@pytest.mark.parametrize(
+    ('stamps_off_ms', 'late_ms', 'words'),
+    [(3_600_000, 5, 'from those of colour'), (0, 300, 'depth comes 0.30 s after')],
+)
+def test_depth_that_never_fits_is_waited_for_no_more(
+    stamps_off_ms: int, late_ms: int, words: str
+) -> None:
+    made = intake()
+    events = []
+    for index in range(60):
+        at = index * 33
+        events.append((at, 'color', at))
+        events.append((at + late_ms, 'depth', at - stamps_off_ms))
+    events += [(at, 'poll', 0) for at in range(0, 2400, 25)]
+    waited = {}
+    for at, what, stamp in sorted(events):
+        if what == 'poll':
+            captures = made.poll(at * MS)
+        elif what == 'color':
+            captures = made.color(message(BASE + stamp * MS), at * MS)
+        else:
+            captures = made.depth(message(BASE + stamp * MS), at * MS)
+        for capture in captures:
+            assert capture.depth is None
+            came = capture.color.header.stamp
+            stamp = came.sec * 1000 + came.nanosec // MS - BASE // MS
+            waited[stamp // 33] = at - stamp
+    assert len(waited) == 60
+    assert max(waited.values()) <= 125
+    assert {waited[index] for index in range(10, 60)} == {0}
+    assert words in made.fit.fault
+
+
+def test_depth_that_was_passed_over_in_time_is_waited_for_again() -> None:
+    made = intake()
+    for index in range(5):
+        now = index * 200 * MS
+        made.color(message(BASE + now), now)
+        made.poll(now + 150 * MS)
+    assert made.fit.hopeless
+    now = 2000 * MS
+    assert len(made.color(message(BASE + now), now)) == 1
+    assert made.depth(message(BASE + now), now + 20 * MS) == []
+    assert not made.fit.hopeless
+    assert made.fit.fault == ''
+    now = 2033 * MS
+    assert made.color(message(BASE + now), now) == []
+    (capture,) = made.depth(message(BASE + now), now + 20 * MS)
+    assert capture.depth is not None
+
+
 def test_nobody_publishes_depth_so_nothing_waits() -> None:
     made = intake()
     made.depth_expected = False
@@ -257,7 +308,7 @@ def test_worker_takes_all_in_order_and_outlives_errors() -> None:
     worker = Worker(work, errors.append, keep=100)
     for item in range(20):
         assert worker.submit(item) == 0
-    worker.call(lambda: done.append('call'))
+    worker.call('mark', lambda: done.append('call'))
     time.sleep(0.2)
     assert worker.stop()
     assert [d for d in done if d != 'call'] == [i for i in range(20) if i % 3]
@@ -275,6 +326,55 @@ def test_worker_ends_while_at_work() -> None:
     assert time.monotonic() - begun < 1
 
 
+def test_a_worker_that_stops_does_what_was_asked_before() -> None:
+    done: list[object] = []
+    gate = threading.Event()
+
+    def work(item: int) -> None:
+        gate.wait(5)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail, keep=100)
+    worker.submit(0, 1, 2)
+    time.sleep(0.05)  # item 0 is in work
+    worker.call('reset', lambda: done.append('reset'))
+    assert not worker.stop(0.05)
+    assert not worker.ended
+    worker.call('configure', lambda: done.append('configure'))  # still in the worker's thread
+    assert done == []
+    gate.set()
+    assert worker.stop()
+    worker.call('late', lambda: done.append(threading.current_thread() is threading.main_thread()))
+    assert done == [0, 'reset', 'configure', True]
+
+
+def test_of_calls_of_one_kind_the_last_counts_and_items_go_on() -> None:
+    done: list[str] = []
+    gate = threading.Event()
+
+    def work(item: str) -> None:
+        gate.wait(5)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail, keep=100)
+    worker.submit('first')
+    time.sleep(0.05)
+    for number in range(100):
+        worker.call('choice', lambda number=number: done.append(f'choice {number}'))
+        worker.call('reset', lambda number=number: done.append(f'reset {number}'))
+    worker.call('choice', lambda: done.append('choice'))
+
+    def again() -> None:
+        worker.call('endless', again)
+
+    worker.call('endless', again)  # asks for itself for ever: items still have their turn
+    worker.submit('second')
+    gate.set()
+    time.sleep(0.1)
+    worker._calls.clear()
+    assert done == ['first', 'reset 99', 'choice', 'second']
+
+
 def frame(index: int = 0) -> Frame:
     rng = np.random.default_rng(2)
     color = rng.integers(0, 255, (120, 160, 3), np.uint8)
@@ -290,16 +390,37 @@ def session() -> tuple[Session, list[str]]:
 
 def test_session_choice_that_fails_keeps_the_target() -> None:
     made, said = session()
-    assert made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    assert made.start(frame(), Box(60, 40, 30, 40))
     made.choose(lambda _: Box(500, 500, 10, 10))
     assert made.process(frame(1)).state is TrackState.TRACKING
     assert len(said) == 1
     assert not made.choosing
 
 
+def test_requests_take_only_a_share_of_the_time_and_the_newest_counts() -> None:
+    clock = [0.0]
+
+    def now() -> float:
+        clock[0] += 0.02  # a start takes so long, in this clock
+        return clock[0]
+
+    made = Session('kcf', default_parameters('kcf'), pytest.fail, now)
+    starts, start = [], made.start
+    made.start = lambda seen, box: starts.append(box.x) or start(seen, box)
+    for index in range(200):
+        x = 40 + index % 40
+        made.choose(lambda _, x=x: Box(x, 40, 30, 40))
+        assert made.process(frame(index)).state is TrackState.TRACKING
+    assert 5 < len(starts) < 200 * 0.6
+    clock[0] += 10
+    made.process(frame(200))
+    assert starts[-1] == 40 + 199 % 40
+    assert not made.choosing
+
+
 def test_session_takes_new_parameters_on_the_present_box() -> None:
     made, _ = session()
-    made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    made.start(frame(), Box(60, 40, 30, 40))
     made.process(frame(1))
     made.configure('kcf', default_parameters('kcf').replace(padding=2.0))
     track = made.process(frame(2))
@@ -310,7 +431,7 @@ def test_session_takes_new_parameters_on_the_present_box() -> None:
 
 def test_session_reset_forgets_target_and_wishes() -> None:
     made, _ = session()
-    made.start(frame(), lambda _: Box(60, 40, 30, 40))
+    made.start(frame(), Box(60, 40, 30, 40))
     made.choose(lambda _: Box(1, 1, 30, 40))
     made.reset()
     assert not made.needs_frame

@@ -23,11 +23,14 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_rig import Rig, overrides, running_node, scene, tracker_process
+from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.generated import outdated
 from rgbd_kcf_tracker.bench.rig import resident_mb
 from rgbd_kcf_tracker.live.settings import READ_ONLY, all_parameters
+from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
+from rgbd_kcf_tracker.track import TrackState
 
 pytestmark = pytest.mark.ros
 
@@ -150,6 +153,50 @@ def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
     rclpy.shutdown(context=context)
 
 
+def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate = threading.Event()
+    monkeypatch.setattr(Worker.stop, '__defaults__', (0.2,))
+    with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
+        rig.play(range(3))
+        session, update = node._session, node._session._tracker.update
+        node._session._tracker.update = lambda frame: gate.wait(30) and update(frame)
+        rig.send(3)
+        time.sleep(0.2)
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert set_parameter(rig, 'variant', 'kcf').successful
+        # Its image is still in work, with the session that a new worker would use.
+        assert not change(rig, Transition.TRANSITION_ACTIVATE)
+        assert state(rig) == State.PRIMARY_STATE_INACTIVE
+        assert change(rig, Transition.TRANSITION_CLEANUP)
+        assert change(rig, Transition.TRANSITION_CONFIGURE)
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        assert node._session is not session
+        rig.await_listener(node)
+        rig.play(range(6, 9))
+        gate.set()
+        rig.play(range(9, 12))
+        assert rig.box() is not None
+        assert node._session.variant == 'kcf'
+
+
+def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
+        rig.play(range(2))
+        node._session._tracker.update = lambda frame: time.sleep(0.3) or node._session.track
+        rig.send(2)
+        time.sleep(0.1)  # in work
+        assert set_parameter(rig, 'variant', 'kcf').successful
+        client = rig.node.create_client(Trigger, '/tracker/reset')
+        assert client.wait_for_service(20)
+        client.call_async(Trigger.Request())
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert change(rig, Transition.TRANSITION_ACTIVATE)
+        assert node._session.variant == 'kcf'
+        assert node._session.track.state is TrackState.IDLE
+
+
 def test_parameters_are_described(rig: Rig) -> None:
     with running_node(rig):
         names = [info.name for info in all_parameters()]
@@ -185,31 +232,11 @@ def test_parameters_while_running(rig: Rig) -> None:
         assert rig.box().as_tuple() == scene(6)[2].as_tuple()
 
 
-def test_bad_overrides_leave_defaults_and_a_message(rig: Rig) -> None:
+def test_integers_for_doubles_and_lists_for_boxes_are_taken(rig: Rig) -> None:
     """Each of these crashes a plain rclpy node."""
-    arguments = []
-    for override in (
-        'kcf.padding:=2',
-        'kcf.learning_rate:=7.5',
-        'pair_tolerance:="soon"',
-        'variant:=3',
-        'init_box:=[1,2,3]',
-        'kcf.padding_:=1.0',
-    ):
-        arguments += ['-p', override]
-    with tracker_process(*arguments) as process:
-        rig.await_listener()
-        rig.play(range(2))
-        values = rig.fresh_values()
-        process.terminate()
-        assert process.wait(20) == 0
-        output = process.stdout.read()
-    assert values['bad_parameters'] == '5'
-    assert 'parameter learning_rate is 7.5: it must be between 0 and 1' in output.replace(
-        'kcf.', ''
-    )
-    assert "unknown parameter 'kcf.padding_' is ignored" in output
-    assert 'Traceback' not in output
+    with running_node(rig, queue_policy='all', kcf__padding=2, init_box=[1, 2, 3, 4]) as node:
+        assert node.get_parameter('kcf.padding').value == 2.0
+        assert node.get_parameter('init_box').value == '1,2,3,4'
 
 
 def test_generated_files_are_up_to_date() -> None:

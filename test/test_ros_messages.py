@@ -23,7 +23,7 @@ from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
 from rgbd_kcf_tracker.live.annotate import annotated
-from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor
+from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor, in_picture
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
@@ -271,7 +271,7 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     answers: list[Track] = []
     made._publishers.publish = lambda header, track, size: answers.append(track)
     image = image_message(HEADER, np.zeros((60, 80, 3), np.uint8), 'bgr8')
-    made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), lambda _: Box(20, 20, 20, 20))
+    made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), Box(20, 20, 20, 20))
 
     def broken(_: Frame) -> Track:
         raise ZeroDivisionError('broken')
@@ -280,3 +280,19 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     made(Capture(image, None, None, 0))
     assert [track.state for track in answers] == [TrackState.OCCLUDED]
     assert faults == ['internal error: ZeroDivisionError: broken']
+
+
+@pytest.mark.parametrize(
+    ('box', 'shown'),
+    [
+        (Box(10.25, 20, 30, 40), Box(10.25, 20, 30, 40)),
+        (Box(-10, 20, 30, 40), Box(0, 20, 20, 40)),
+        (Box(70, 50, 30.5, 40), Box(70, 50, 10, 10)),
+        (Box(90, 20, 30, 40), None),
+    ],
+)
+def test_boxes_are_of_what_lies_in_the_picture(box: Box, shown: Box | None) -> None:
+    frame = Frame(np.zeros((60, 80, 3), np.uint8))
+    track = in_picture(Track(box, TrackState.TRACKING, 0.7, 2.0), frame)
+    assert track.box == shown
+    assert track.state is (TrackState.OCCLUDED if shown is None else TrackState.TRACKING)

@@ -23,6 +23,11 @@ SCENARIO, SEED = 'normal', 1
 START = 30
 """First frame of the scene that is played: the person is whole in view from there."""
 NAMESPACE = '/rgbd_kcf_benchmark'
+WIRE = f'{NAMESPACE}/wire'
+"""Namespace of the node that only answers, and of the topics that it is sent."""
+BLOCK = 60
+"""Pairs to the tracker, then as many to the wire: so both are measured on the same machine at the
+same time, and neither waits for the other's processor."""
 FRAME_ID = 'kinect2_rgb_optical_frame'
 MATCH_TIMEOUT_S = 30.0
 ANSWER_TIMEOUT_S = 20.0
@@ -37,6 +42,7 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--count', type=int, default=300)
     parser.add_argument('--frames', type=int, default=20, help='different frames to play')
     parser.add_argument('--ahead', type=int, default=3, help='with rate 0: pairs under way at most')
+    parser.add_argument('--wire', action='store_true', help='send as many pairs to the wire')
     parser.add_argument('--compressed', action='store_true', help='JPEG and compressedDepth PNG')
     options = parser.parse_args(args)
     keep_large_blocks()
@@ -44,7 +50,7 @@ def main(args: list[str] | None = None) -> int:
     from rclpy.executors import ExternalShutdownException
 
     rclpy.init()
-    camera = Camera(options.size, options.frames, options.compressed)
+    camera = Camera(options.size, options.frames, options.compressed, options.wire)
     try:
         if not camera.await_listener(MATCH_TIMEOUT_S):
             return 1
@@ -64,7 +70,7 @@ def main(args: list[str] | None = None) -> int:
 class Camera:
     """Publishers of a colour, a depth and a camera_info topic, and what they send."""
 
-    def __init__(self, size: str, frames: int, compressed: bool) -> None:
+    def __init__(self, size: str, frames: int, compressed: bool, wire: bool = False) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import PolygonStamped
         from rclpy.node import Node
@@ -75,9 +81,14 @@ class Camera:
         qos = QoSProfile(depth=5)
         kind: Any = CompressedImage if compressed else Image
         color, depth = ('/compressed', '/compressedDepth') if compressed else ('', '')
-        self._color = self.node.create_publisher(kind, f'color/image{color}', qos)
-        self._depth = self.node.create_publisher(kind, f'depth/image{depth}', qos)
-        self._info = self.node.create_publisher(CameraInfo, 'color/camera_info', qos)
+        self._publishers = [
+            (
+                self.node.create_publisher(CameraInfo, f'{where}/color/camera_info', qos),
+                self.node.create_publisher(kind, f'{where}/color/image{color}', qos),
+                self.node.create_publisher(kind, f'{where}/depth/image{depth}', qos),
+            )
+            for where in (NAMESPACE, *([WIRE] if wire else []))
+        ]
         self._answers = 0
         self._known = False
         self.node.create_subscription(
@@ -95,11 +106,11 @@ class Camera:
         self._known |= any(status.name.startswith(NAMESPACE) for status in message.status)
 
     def await_listener(self, timeout_s: float) -> bool:
-        """Until the tracker listens to all three topics and its answers come here."""
+        """Until all topics have their listener and the tracker's answers come here."""
         import rclpy
 
         end = time.monotonic() + timeout_s
-        topics = (self._color, self._depth, self._info)
+        topics = [publisher for each in self._publishers for publisher in each]
         while not (self._known and all(p.get_subscription_count() for p in topics)):
             if time.monotonic() > end:
                 return False
@@ -108,12 +119,16 @@ class Camera:
         return True
 
     def play(self, count: int, rate: float) -> None:
-        """Send pairs at a rate, each stamped when it goes out."""
-        order = self._order()
+        """Send each listener so many pairs at a rate, each stamped when it goes out."""
+        orders = [self._order() for _ in self._publishers]
         begin = time.monotonic()
-        for index in range(count):
-            time.sleep(max(begin + index / rate - time.monotonic(), 0.0))
-            self._send(next(order))
+        sent = 0
+        for first in range(0, count, BLOCK):
+            for to, order in enumerate(orders):
+                for _ in range(first, min(first + BLOCK, count)):
+                    time.sleep(max(begin + sent / rate - time.monotonic(), 0.0))
+                    self._send(next(order), to)
+                    sent += 1
 
     def play_answered(self, count: int, ahead: int) -> None:
         """Send pairs as fast as they are answered."""
@@ -136,15 +151,14 @@ class Camera:
         there_and_back = self._messages + self._messages[-2:0:-1]
         return itertools.cycle(there_and_back)
 
-    def _send(self, messages: tuple[Any, Any, Any]) -> None:
+    def _send(self, messages: tuple[Any, Any, Any], to: int = 0) -> None:
         from rgbd_kcf_tracker.ros.messages import stamp_from_ns
 
         color, depth, info = messages
         stamp = stamp_from_ns(time.time_ns())
         color.header.stamp = depth.header.stamp = info.header.stamp = stamp
-        self._info.publish(info)
-        self._color.publish(color)
-        self._depth.publish(depth)
+        for publisher, message in zip(self._publishers[to], (info, color, depth), strict=True):
+            publisher.publish(message)
 
 
 def _messages(size: tuple[int, int], frames: int) -> Iterator[tuple[Any, Any, Any]]:

@@ -1,17 +1,20 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measure the live node: a camera in one process, the tracker in another, a listener in a third.
+"""Measure the live node: camera, tracker and listener as processes, and the wire beside them.
 
     python -m rgbd_kcf_tracker.bench.live --sizes qhd hd --seconds 20
 
-Latency is from the stamp, set just before the images go out, to the box's arrival at the listener.
+Latency is from the stamp, set just before the images go out, to the answer's arrival at the
+listener. The camera sends to the tracker and to a node that does nothing but answer by turns: what
+the tracker has on top of that means something on any machine, however busy.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from contextlib import ExitStack
@@ -20,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rgbd_kcf_tracker.bench.camera import NAMESPACE, SCENARIO, SEED, SIZES, START
+from rgbd_kcf_tracker.bench.camera import BLOCK, NAMESPACE, SCENARIO, SEED, SIZES, START
 from rgbd_kcf_tracker.bench.rig import Listener, child, cpu_seconds, environment
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
@@ -30,16 +33,37 @@ EDGES_MS = (0, 2, 4, 6, 8, 10, 12, 15, 20, 25, 33, 50, 100, 200)
 
 
 @dataclass(frozen=True, slots=True)
+class Figures:
+    """How a node answered.
+
+    Attributes:
+        answered, boxes: pairs answered; with a box.
+        median_ms, p95_ms, p99_ms, max_ms: stamp to answer at the listener.
+        cpu_ms: processor time of the node's process for each pair that was sent to it.
+        histogram: answers per bin of latency, bins as in EDGES_MS and one beyond.
+    """
+
+    answered: int
+    boxes: int
+    median_ms: float
+    p95_ms: float
+    p99_ms: float
+    max_ms: float
+    cpu_ms: float
+    histogram: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Result:
     """One run's figures.
 
     Attributes:
         variant, size, rate_hz: what was run.
-        sent, received, processed, dropped, boxes: pairs; colour images that reached the node;
-            answers; pairs passed over for newer ones; answers with a box.
-        median_ms, p95_ms, p99_ms, max_ms: stamp to box at the listener.
-        cpu_cores: processor time of the tracker's process per second.
-        histogram: answers per bin of latency, bins as in EDGES_MS and one beyond.
+        sent: pairs to each of the two nodes.
+        received, dropped: colour images that reached the tracker; pairs passed over for newer ones.
+        tracker: of the tracker.
+        wire: of a node that does nothing but answer.
+        stages: what the tracker's diagnostics say of where the time goes.
     """
 
     variant: str
@@ -47,22 +71,22 @@ class Result:
     rate_hz: float
     sent: int
     received: int
-    processed: int
     dropped: int
-    boxes: int
-    median_ms: float
-    p95_ms: float
-    p99_ms: float
-    max_ms: float
-    cpu_cores: float
-    histogram: tuple[int, ...]
+    tracker: Figures
+    wire: Figures
+    stages: dict[str, float]
+
+    @property
+    def extra_cpu(self) -> float:
+        """The tracker's processor time on top of the wire's, in units of the wire's."""
+        return self.tracker.cpu_ms / self.wire.cpu_ms - 1 if self.wire.cpu_ms else math.nan
 
 
 def measure(variant: str, size: str, rate: float, seconds: float, with_profile: bool) -> Result:
     """Run one case.
 
     Raises:
-        RuntimeError: where the tracker answers nothing.
+        RuntimeError: where one of the nodes answers nothing.
     """
     count = round(seconds * rate) + WARM_UP
     env = environment(with_profile)
@@ -71,51 +95,63 @@ def measure(variant: str, size: str, rate: float, seconds: float, with_profile: 
         *namespace,
         *('-p', f'variant:={variant}', '-p', f'init_box:={first_box(size)}'),
     )
-    camera_arguments = ('--size', size, '--rate', str(rate), '--count', str(count))
+    camera_arguments = ('--size', size, '--rate', str(rate), '--count', str(count), '--wire')
     listener = Listener()
     try:
         with ExitStack() as children:
             tracker = children.enter_context(
                 child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env)
             )
+            wire = children.enter_context(child('rgbd_kcf_tracker.bench.wire', env=env))
             listener.await_tracker(tracker)
             camera = children.enter_context(
                 child('rgbd_kcf_tracker.bench.camera', *camera_arguments, env=env)
             )
             begin: tuple[float, float] | None = None
-            end = (0.0, 0.0)
             while camera.poll() is None and tracker.poll() is None:
                 listener.spin(0.2)
-                if len(listener.arrivals) >= WARM_UP and begin is None:
-                    begin = time.monotonic(), cpu_seconds(tracker.pid)
-                if len(listener.arrivals) < count and tracker.poll() is None:
-                    end = time.monotonic(), cpu_seconds(tracker.pid)
+                if begin is None and listener.arrivals and listener.wire:
+                    begin = cpu_seconds(tracker.pid), cpu_seconds(wire.pid)
             if begin is None:
-                raise RuntimeError('the tracker answered nothing')
+                raise RuntimeError('the tracker or the wire answered nothing')
             still = time.monotonic() + 2.5  # for the last diagnostics
             while time.monotonic() < still:
                 listener.spin(0.2)
+            end = cpu_seconds(tracker.pid), cpu_seconds(wire.pid)
     finally:
         listener.close()
-    arrivals = listener.arrivals
-    latency = np.array([(came - stamp) / 1e6 for stamp, came, _ in arrivals[WARM_UP:]])
-    bins = np.histogram(latency, (*EDGES_MS, np.inf))[0]
-    median, p95, p99 = np.percentile(latency, (50, 95, 99))
+    diagnostics = listener.diagnostics
+    spent = [(after - before) * 1e3 for before, after in zip(begin, end, strict=True)]
+    # The first block has gone to the tracker when the wire answers for the first time.
     return Result(
         variant=variant,
         size=size,
         rate_hz=rate,
         sent=count,
-        received=int(listener.diagnostics.get('color_received', 0)),
-        processed=len(arrivals),
-        dropped=int(listener.diagnostics.get('dropped', 0)),
+        received=int(diagnostics.get('color_received', 0)),
+        dropped=int(diagnostics.get('dropped', 0)),
+        tracker=_figures(listener.arrivals, spent[0] / max(count - BLOCK, 1)),
+        wire=_figures(listener.wire, spent[1] / count),
+        stages={
+            name: float(value)
+            for name, value in diagnostics.items()
+            if name.endswith(('_median_ms', '_p99_ms'))
+        },
+    )
+
+
+def _figures(arrivals: list[tuple[int, int, bool]], cpu_ms: float) -> Figures:
+    latency = np.array([(came - stamp) / 1e6 for stamp, came, _ in arrivals[WARM_UP:]])
+    median, p95, p99 = np.percentile(latency, (50, 95, 99)) if len(latency) else (math.nan,) * 3
+    return Figures(
+        answered=len(arrivals),
         boxes=sum(has_box for _, _, has_box in arrivals),
         median_ms=float(median),
         p95_ms=float(p95),
         p99_ms=float(p99),
-        max_ms=float(latency.max()),
-        cpu_cores=(end[1] - begin[1]) / max(end[0] - begin[0], 1e-9),
-        histogram=tuple(int(n) for n in bins),
+        max_ms=float(latency.max()) if len(latency) else math.nan,
+        cpu_ms=cpu_ms,
+        histogram=tuple(int(n) for n in np.histogram(latency, (*EDGES_MS, np.inf))[0]),
     )
 
 
@@ -132,35 +168,48 @@ def first_box(size: str) -> str:
 
 
 def table(results: list[Result]) -> str:
-    """The figures as a Markdown table."""
+    """The figures as a Markdown table: a row for the tracker, one for the wire beside it."""
     lines = [
-        '| variant | images | rate, Hz | sent | received | processed | dropped | with box '
-        '| median, ms | p95, ms | p99, ms | max, ms | node CPU, cores |',
-        '|---|---|---|---|---|---|---|---|---|---|---|---|---|',
+        '| node | images | rate, Hz | sent | answered | dropped | with box '
+        '| median, ms | p95, ms | p99, ms | max, ms | CPU per pair, ms |',
+        '|---|---|---|---|---|---|---|---|---|---|---|---|',
     ]
     for r in results:
         width, height = SIZES[r.size]
-        lines.append(
-            f'| `{r.variant}` | {r.size} {width}x{height} | {r.rate_hz:g} | {r.sent} '
-            f'| {r.received} | {r.processed} | {r.dropped} | {r.boxes} | {r.median_ms:.1f} '
-            f'| {r.p95_ms:.1f} | {r.p99_ms:.1f} | {r.max_ms:.1f} | {r.cpu_cores:.2f} |'
-        )
+        for name, f in ((f'`{r.variant}`', r.tracker), ('the wire', r.wire)):
+            dropped, boxes = (r.dropped, f.boxes) if f is r.tracker else ('', '')
+            lines.append(
+                f'| {name} | {r.size} {width}x{height} | {r.rate_hz:g} | {r.sent} '
+                f'| {f.answered} | {dropped} | {boxes} | {f.median_ms:.1f} '
+                f'| {f.p95_ms:.1f} | {f.p99_ms:.1f} | {f.max_ms:.1f} | {f.cpu_ms:.1f} |'
+            )
     return '\n'.join(lines)
 
 
 def histogram(result: Result) -> str:
-    """Latency as bars of text."""
-    most = max(*result.histogram, 1)
-    lines = [f'{result.variant}, {result.size}: stamp to box']
-    for index, number in enumerate(result.histogram):
+    """Latencies of tracker and wire as bars of text, and what one has on top of the other."""
+    lines = [f'{result.variant}, {result.size}: stamp to answer, tracker # and wire o']
+    most = max(*result.tracker.histogram, *result.wire.histogram, 1)
+    for index, (ours, wires) in enumerate(
+        zip(result.tracker.histogram, result.wire.histogram, strict=True)
+    ):
         low = EDGES_MS[index]
         high = f'{EDGES_MS[index + 1]}' if index + 1 < len(EDGES_MS) else ''
-        lines.append(f'{low:4d} to {high:>3} ms {number:6d} {"#" * round(40 * number / most)}')
+        bars = [
+            f'{number:6d} {mark * round(30 * number / most):30}'
+            for number, mark in ((ours, '#'), (wires, 'o'))
+        ]
+        lines.append(f'{low:4d} to {high:>3} ms {bars[0]} {bars[1]}'.rstrip())
+    lines.append(
+        f'on top of the wire: median {result.tracker.median_ms - result.wire.median_ms:.1f} ms, '
+        f'processor {result.extra_cpu:.1f} times its own'
+    )
+    lines += [f'{name}: {value:.1f}' for name, value in result.stages.items()]
     return '\n'.join(lines)
 
 
 def main(args: list[str] | None = None) -> int:
-    """Measure, print the table and the histograms; status 1 where a pair was not processed."""
+    """Measure, print the table and the histograms; status 1 where a pair was not answered."""
     parser = argparse.ArgumentParser(
         prog='python -m rgbd_kcf_tracker.bench.live',
         description=(__doc__ or '').split('\n')[0],
@@ -190,7 +239,7 @@ def main(args: list[str] | None = None) -> int:
         options.output.write_text(
             json.dumps([asdict(r) for r in results], indent=1), encoding='utf-8'
         )
-    return 0 if all(r.processed == r.sent for r in results) else 1
+    return 0 if all(r.tracker.answered == r.sent for r in results) else 1
 
 
 if __name__ == '__main__':

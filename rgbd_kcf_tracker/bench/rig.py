@@ -13,11 +13,12 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rgbd_kcf_tracker.bench.camera import NAMESPACE
-from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE, profile_path
+from rgbd_kcf_tracker.bench.camera import NAMESPACE, WIRE
+from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE, fitting_profile
 
 
 def environment(with_profile: bool = True) -> dict[str, str]:
@@ -25,7 +26,7 @@ def environment(with_profile: bool = True) -> dict[str, str]:
     variables = dict(os.environ)
     variables.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     variables.setdefault('ROS_LOG_DIR', tempfile.gettempdir())
-    path = profile_path()
+    path = fitting_profile()
     if with_profile and path is not None:
         variables.setdefault(PROFILE_VARIABLE, str(path))
     return variables
@@ -77,17 +78,20 @@ class Listener:
         self._executor.add_node(self.node)
         self.arrivals: list[tuple[int, int, bool]] = []
         """For each box message: stamp and arrival in nanoseconds, and whether it has a box."""
+        self.wire: list[tuple[int, int, bool]] = []
+        """The same of the node that only answers."""
         self.diagnostics: dict[str, str] = {}
-        self.node.create_subscription(
-            PolygonStamped, 'tracker/box', self._on_box, QoSProfile(depth=1000)
-        )
+        for topic, kept in (('tracker/box', self.arrivals), (f'{WIRE}/box', self.wire)):
+            self.node.create_subscription(
+                PolygonStamped, topic, partial(self._on_box, kept), QoSProfile(depth=1000)
+            )
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
 
-    def _on_box(self, message: Any) -> None:
+    def _on_box(self, kept: list[tuple[int, int, bool]], message: Any) -> None:
         from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 
         stamp = stamp_to_ns(message.header.stamp)
-        self.arrivals.append((stamp, time.time_ns(), bool(message.polygon.points)))
+        kept.append((stamp, time.time_ns(), bool(message.polygon.points)))
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:

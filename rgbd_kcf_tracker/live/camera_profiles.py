@@ -15,6 +15,11 @@ from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
 
 NO_CAMERA = 'none'
 """As a profile's name: nothing is remapped."""
+TRANSPORTS = {
+    'color_transport': (RAW, COMPRESSED),
+    'depth_transport': (RAW, COMPRESSED, COMPRESSED_DEPTH),
+    'packed_depth_transport': (COMPRESSED, COMPRESSED_DEPTH),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +29,7 @@ class CameraProfile:
     Attributes:
         color, depth, info: topics.
         description, encodings, needs: for people to read.
+        color_transport, depth_transport: how its images arrive.
         packed_depth_transport: the depth transport that this driver offers beside raw.
     """
 
@@ -33,6 +39,8 @@ class CameraProfile:
     description: str = ''
     encodings: str = ''
     needs: str = ''
+    color_transport: str = RAW
+    depth_transport: str = RAW
     packed_depth_transport: str = COMPRESSED_DEPTH
 
     def remappings(self) -> list[tuple[str, str]]:
@@ -45,9 +53,12 @@ class CameraProfile:
         return [(name, topic) for name, topic in pairs if topic]
 
     def transports(self, compressed: bool) -> dict[str, str]:
-        """The tracker's parameters for raw or for compressed images."""
+        """The tracker's parameters for images as they arrive, or for compressed ones."""
         if not compressed:
-            return {'color_transport': RAW, 'depth_transport': RAW}
+            return {
+                'color_transport': self.color_transport,
+                'depth_transport': self.depth_transport,
+            }
         return {
             'color_transport': COMPRESSED,
             'depth_transport': self.packed_depth_transport,
@@ -66,13 +77,25 @@ def load_cameras(path: Path) -> dict[str, CameraProfile]:
         raise ParameterError(f'{path}: camera profiles cannot be read: {error}') from None
     known = {field.name for field in fields(CameraProfile)}
     profiles = {NO_CAMERA: CameraProfile('', '', '', 'topics as the tracker names them')}
-    for name, values in (content or {}).items():
+    content = {} if content is None else content
+    if not isinstance(content, dict) or not all(isinstance(v, dict) for v in content.values()):
+        raise ParameterError(
+            f'{path}: camera profiles are names with entries: see the shipped file'
+        )
+    for name, values in content.items():
         unknown = sorted(set(values) - known)
         missing = sorted({'color', 'depth', 'info'} - set(values))
         if unknown or missing:
             wrong = f'unknown {", ".join(unknown)}' if unknown else f'no {", ".join(missing)}'
             raise ParameterError(f'{path}: camera {name} has {wrong}: known are {sorted(known)}')
-        profiles[str(name)] = CameraProfile(**{k: str(v) for k, v in values.items()})
+        profile = CameraProfile(**{k: str(v) for k, v in values.items()})
+        for key, choices in TRANSPORTS.items():
+            given = getattr(profile, key)
+            if given not in choices:
+                raise ParameterError(
+                    f'{path}: camera {name}: {key} is {given!r}: choose one of {", ".join(choices)}'
+                )
+        profiles[str(name)] = profile
     return profiles
 
 

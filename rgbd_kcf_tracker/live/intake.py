@@ -20,13 +20,15 @@ from rgbd_kcf_tracker.live.processor import Camera, Capture
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.recordings.images import as_bytes
 from rgbd_kcf_tracker.recordings.messages import stamp_of
-from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer
+from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer, patient_pairer
 
 MISSES = 3
 """Colour images in a row without depth after which depth is not waited for any more."""
-PATIENT_WAIT_S = 1.0
+PATIENT_WAIT_NS = 1_000_000_000
 """Least wait for depth where every pair counts and speed does not."""
 HELD = 5
+REMEMBERED = 60
+"""Colour images that went out alone and are remembered: two seconds at 30 Hz."""
 
 
 class StampRepair:
@@ -50,16 +52,59 @@ class StampRepair:
         return repaired
 
 
-class LivePairer(StampPairer[Any, Any]):
-    """A pairer that can be told that a message has waited long enough."""
+class DepthFit:
+    """Whether depth is worth waiting for, and if not, why it never fits.
 
-    def release(self, stamp_ns: int) -> list[Pair[Any, Any]]:
-        """Give out every colour message up to this stamp with what there is for it."""
-        return [self._take(s, self._partner(s)) for s in sorted(self._colors) if s <= stamp_ns]
+    Args:
+        tolerance_ns: of stamps within a pair.
+        wait_ns: how long colour would wait.
+    """
 
-    def waiting_colors(self) -> frozenset[int]:
-        """Stamps of the colour messages that wait."""
-        return frozenset(self._colors)
+    def __init__(self, tolerance_ns: int, wait_ns: int) -> None:
+        self._tolerance_ns, self._wait_ns = tolerance_ns, wait_ns
+        self._misses = 0
+        self._alone: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
+        self._newest: int | None = None
+        self._apart_ns = 0
+        self._late_ns: int | None = None
+
+    @property
+    def hopeless(self) -> bool:
+        """Several colour images in a row found no depth, and none came soon after them."""
+        return self._misses >= MISSES
+
+    @property
+    def fault(self) -> str:
+        """Why depth does not fit, in words; empty where it does or nothing is known."""
+        if not self.hopeless or self._newest is None:
+            return ''
+        if self._late_ns is not None:
+            return (
+                f'depth comes {self._late_ns * 1e-9:.2f} s after its colour image: see depth_wait'
+            )
+        return (
+            f'stamps of depth are {self._apart_ns * 1e-9:.3f} s from those of colour: are the '
+            'streams synchronised (see pair_tolerance)?'
+        )
+
+    def paired(self) -> None:
+        """A colour image found its depth."""
+        self._misses = 0
+
+    def missed(self, stamp_ns: int, arrival_ns: int) -> None:
+        """A colour image went out alone."""
+        self._misses += 1
+        self._alone.append((stamp_ns, arrival_ns))
+        if self._newest is not None:
+            self._apart_ns = abs(stamp_ns - self._newest)
+
+    def came(self, stamp_ns: int, arrival_ns: int) -> None:
+        """A depth image came; where its colour image went out alone, it may have been in time."""
+        self._newest = stamp_ns
+        late = [a for s, a in self._alone if abs(s - stamp_ns) <= self._tolerance_ns]
+        self._late_ns = arrival_ns - late[-1] if late else None
+        if self._late_ns is not None and self._late_ns <= self._wait_ns:
+            self._misses = 0
 
 
 class Intake:
@@ -71,6 +116,9 @@ class Intake:
         depth_wait_s: how long colour waits for depth.
         camera_info_wait_s: how long the first colour waits for intrinsics.
         patient: every pair counts (recordings, lock-step): wait longer rather than miss a partner.
+
+    Attributes:
+        fit: whether depth finds its colour image.
     """
 
     def __init__(
@@ -84,17 +132,16 @@ class Intake:
     ) -> None:
         self._statistics = statistics
         # As recordings are paired where every pair counts: stamps alone decide, not the rate.
-        self._pairer = (
-            LivePairer(tolerance_s, capacity=1000, max_wait_s=60.0)
-            if patient
-            else LivePairer(tolerance_s)
+        self._pairer: StampPairer[Any, Any] = (
+            patient_pairer(tolerance_s) if patient else StampPairer(tolerance_s)
         )
         self._wait_ns = round(depth_wait_s * 1e9)
+        self._first_wait_ns = max(self._wait_ns, PATIENT_WAIT_NS) if patient else self._wait_ns
+        self.fit = DepthFit(self._pairer.tolerance_ns, self._first_wait_ns)
         self._info_wait_ns = round(camera_info_wait_s * 1e9)
         self._patient = patient
         self._repair_color, self._repair_depth = StampRepair(), StampRepair()
         self._arrivals: dict[int, int] = {}
-        self._misses = 0
         self._held: deque[Capture] = deque()
         self._hold_from: int | None = None
         self._holding = True
@@ -132,7 +179,7 @@ class Intake:
         if stamp is None:
             self._statistics.count('duplicates')
             return []
-        self._misses = 0
+        self.fit.came(stamp, arrival_ns)
         return self._captures(self._pairer.add_depth(stamp, message), arrival_ns)
 
     def poll(self, now_ns: int) -> list[Capture]:
@@ -149,17 +196,18 @@ class Intake:
     def _present_wait_ns(self) -> int:
         if not self.depth_expected:
             return 0
-        if self._misses >= MISSES:
+        if self.fit.hopeless:
             return self._wait_ns if self._patient else 0
-        least = round(PATIENT_WAIT_S * 1e9) if self._patient else 0
-        return max(self._wait_ns, least)
+        return self._first_wait_ns
 
     def _captures(self, pairs: list[Pair[Any, Any]], now_ns: int) -> list[Capture]:
         captures = []
         for pair in pairs:
-            self._arrivals.pop(pair.stamp_ns, None)
-            if pair.depth is None:
-                self._misses += 1
+            arrival = self._arrivals.pop(pair.stamp_ns, now_ns)
+            if pair.depth is not None:
+                self.fit.paired()
+            else:
+                self.fit.missed(pair.stamp_ns, arrival)
                 self._statistics.count('color_without_depth')
             captures.append(Capture(pair.color, pair.depth, self._camera, now_ns))
         self._forget_lost()
@@ -174,7 +222,7 @@ class Intake:
     def _forget_lost(self) -> None:
         """Drop the arrivals of messages that the pairer did not keep (late, repeated)."""
         if len(self._arrivals) > self._pairer.waiting[0]:
-            known = self._pairer.waiting_colors()
+            known = self._pairer.waiting_colors
             self._arrivals = {s: a for s, a in self._arrivals.items() if s in known}
 
     def _hold(self, captures: list[Capture], now_ns: int) -> list[Capture]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
-from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Moment, Timeline
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
@@ -77,6 +77,23 @@ class Publishers(Protocol):
         ...
 
 
+SHORTEST_LOOP = 10
+"""Images between two jumps back that make a loop; fewer are a fault of the stamps."""
+
+
+def in_picture(track: Track, frame: Frame) -> Track:
+    """The track with the part of its box that lies in the picture; hidden where no part does."""
+    box = track.box
+    if box is None:
+        return track
+    shown = box.clipped(frame.width, frame.height)
+    if shown == box:
+        return track
+    if shown is None:
+        return replace(track, box=None, state=TrackState.OCCLUDED, score=0.0)
+    return replace(track, box=shown)
+
+
 class Processor:
     """Decodes what is needed, asks the session, publishes, counts.
 
@@ -108,6 +125,7 @@ class Processor:
         self._timeline = Timeline()
         self._last: tuple[Capture, int] | None = None
         self._frame_id: str | None = None
+        self._restarts = self._steady = 0
         self.on_restart: Callable[[], None] | None = None
         self._decode_color: Callable[[Any], ColorImage] = (
             decode_color if color_transport == RAW else decode_compressed_color
@@ -118,6 +136,7 @@ class Processor:
 
     def __call__(self, capture: Capture) -> None:
         """Answer one pair: there is a result for every pair, whatever is wrong with it."""
+        begun = time.monotonic_ns()
         header = capture.color.header
         moment = self._timeline.advance(stamp_of(capture.color), capture.arrival_ns)
         self._notice(header, moment)
@@ -125,21 +144,35 @@ class Processor:
         frame: Frame | None = None
         size: tuple[int, int] | None = None
         track = IDLE
+        decoded = begun
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
+            decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
                 size = frame.width, frame.height
                 try:
-                    track = session.process(frame)
+                    track = in_picture(session.process(frame), frame)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
+        tracked = time.monotonic_ns()
         self._publishers.publish(header, track, size)
-        latency = self._now_ns() - stamp_of(capture.color)
-        work = time.monotonic_ns() - capture.arrival_ns
-        self._statistics.processed(latency / 1e6, work / 1e6)
+        published = time.monotonic_ns()
+        latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
+        work = (published - capture.arrival_ns) / 1e6
+        self._statistics.processed(
+            Times(
+                latency=latency,
+                work=work,
+                transport=latency - work,
+                waiting=(begun - capture.arrival_ns) / 1e6,
+                decode=(decoded - begun) / 1e6,
+                track=(tracked - decoded) / 1e6,
+                publish=(published - tracked) / 1e6,
+            )
+        )
         self._last = capture, moment.time_ns
         if frame is not None:
             self._publishers.publish_extras(header, track, frame, frame.intrinsics)
@@ -151,16 +184,14 @@ class Processor:
 
     def choose(self, choice: Choice, oldest_s: float) -> None:
         """Start on the newest image, or the next one where the newest is old or shows nothing."""
-        if self._last is not None:
-            capture, time_ns = self._last
-            if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
-                self.session.choose(choice)  # so that depth is decoded for it
-                frame = self.frame(capture, time_ns)
-                if frame is not None:
-                    self.session.start(frame, choice)
-                    self.session.choose(None)
-                    return
         self.session.choose(choice)
+        if self._last is None or not self.session.due:
+            return
+        capture, time_ns = self._last
+        if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
+            frame = self.frame(capture, time_ns)
+            if frame is not None:
+                self.session.start_as_asked(frame)
 
     def frame(self, capture: Capture, time_ns: int) -> Frame | None:
         """The pair as a frame; without depth where that cannot be used; None without a picture."""
@@ -206,9 +237,20 @@ class Processor:
         return depth
 
     def _notice(self, header: Any, moment: Moment) -> None:
+        self._steady += 1
         if moment.jumped:
-            self._fault('time_jumps', 'stamps jumped: a looping bag, or a camera clock not set?')
-            if moment.restarted and self.on_restart is not None:
+            # A bag that loops is no fault: it is said once, and counted.
+            loop = moment.restarted and self._restarts > 0 and self._steady >= SHORTEST_LOOP
+            if not loop:
+                self._fault(
+                    'time_jumps',
+                    'stamps jumped: a looping bag (then this is said once), a camera clock that '
+                    'was set, or two publishers?',
+                )
+        if moment.restarted:
+            self._restarts, self._steady = self._restarts + 1, 0
+            self._statistics.set('restarts', self._restarts)
+            if self.on_restart is not None:
                 self.on_restart()
         if self._frame_id is not None and header.frame_id != self._frame_id:
             self._fault(

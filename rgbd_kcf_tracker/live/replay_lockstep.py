@@ -14,8 +14,16 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
-from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S, Pair, StampPairer
+from rgbd_kcf_tracker.live.stopping import Stopping
+from rgbd_kcf_tracker.recordings.pairing import (
+    DEFAULT_TOLERANCE_S,
+    Pair,
+    StampPairer,
+    patient_pairer,
+)
 
+AHEAD = 30
+"""Colour images that may be under way without being due: depth a second late, at 30 Hz."""
 REMEMBERED = 1024
 """Answers that are waited for at most when nobody answers at all."""
 
@@ -23,9 +31,10 @@ REMEMBERED = 1024
 class Answers:
     """Matches what was sent with what came back. Safe to use from several threads.
 
-    Pairs are decided by the tracker's own :class:`StampPairer`: a pair of unequal stamps is known
-    to be one only when later images have come, and to wait for its answer earlier would be to wait
-    for ever.
+    Pairs are decided by the pairer that a tracker with ``queue_policy`` all has: a pair of unequal
+    stamps is known to be one only when later images have come, and to wait for its answer earlier
+    would be to wait for ever. Where depth has stopped, the tracker gives up waiting for it by the
+    wall clock, and :data:`AHEAD` holds the images back until then.
 
     Args:
         has_depth: without a depth topic each colour image is answered alone.
@@ -45,7 +54,7 @@ class Answers:
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._has_depth = has_depth
-        self._pairer: StampPairer[float, None] = StampPairer(tolerance_s)
+        self._pairer: StampPairer[float, None] = patient_pairer(tolerance_s)
         self._now = now
         self._changed = threading.Condition()
         self._due: dict[int, float] = {}
@@ -80,13 +89,17 @@ class Answers:
                 self.latencies_s.append(self._now() - sent)
                 self._changed.notify_all()
             else:
+                self._changed.notify_all()
                 # The tracker may decide sooner, when the depth image never arrived.
                 self._early[stamp_ns] = self._now()
                 while len(self._early) > REMEMBERED:
                     del self._early[next(iter(self._early))]
 
-    def wait(self, timeout_s: float, stop: threading.Event) -> bool:
-        """Wait until everything due is answered; False after ``timeout_s`` or when stopped."""
+    def wait(self, timeout_s: float, stop: Stopping) -> bool:
+        """Wait until everything due is answered; False after ``timeout_s`` or when stopped.
+
+        Also waits, as long at most, while too much is under way that may be due later.
+        """
         deadline = self._now() + timeout_s
         with self._changed:
             while self._due:
@@ -94,9 +107,11 @@ class Answers:
                 if left <= 0 or stop.is_set():
                     return False
                 self._changed.wait(min(left, 0.1))
+            while self._undecided() > AHEAD and self._now() < deadline and not stop.is_set():
+                self._changed.wait(0.1)
         return True
 
-    def drain(self, quiet_s: float, stop: threading.Event) -> bool:
+    def drain(self, quiet_s: float, stop: Stopping) -> bool:
         """Wait as long as answers still come; False where some are missing after ``quiet_s``."""
         seen = -1
         while seen != len(self.latencies_s) and not stop.is_set():
@@ -112,6 +127,9 @@ class Answers:
             self._due.clear()
             self.unanswered += len(stamps)
             return stamps
+
+    def _undecided(self) -> int:
+        return len(self._pairer.waiting_colors - self._early.keys())
 
     def _expect(self, pairs: Iterable[Pair[float, None]]) -> None:
         for pair in pairs:

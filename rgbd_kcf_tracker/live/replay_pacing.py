@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable
+
+from rgbd_kcf_tracker.live.stopping import Stopping
 
 CLOCK_PERIOD_S = 0.01
 """Recorded time is announced at least this often while waiting: 100 Hz."""
@@ -63,9 +64,7 @@ class Pacer:
         """Start anew at the next message."""
         self._origin = None
 
-    def wait(
-        self, time_ns: int, stop: threading.Event, tick: Callable[[int], None] | None = None
-    ) -> bool:
+    def wait(self, time_ns: int, stop: Stopping, tick: Callable[[int], None] | None = None) -> bool:
         """Wait until the message recorded at ``time_ns`` is due; False when ``stop`` was set.
 
         Args:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -15,6 +14,7 @@ from rgbd_kcf_tracker.live.prefetch import prefetched
 from rgbd_kcf_tracker.live.replay_lockstep import Answers
 from rgbd_kcf_tracker.live.replay_message import Message, Role
 from rgbd_kcf_tracker.live.replay_pacing import Pacer
+from rgbd_kcf_tracker.live.stopping import Stopping
 
 ATTEMPTS = 3
 """How often images are sent in lock-step before their answer is given up."""
@@ -74,7 +74,7 @@ class Player:
         self._recent: deque[Message] = deque(maxlen=RECENT)
         self.progress = Progress()
 
-    def play(self, messages: Iterable[Message], stop: threading.Event) -> bool:
+    def play(self, messages: Iterable[Message], stop: Stopping) -> bool:
         """Send all messages once; False when ``stop`` was set before the end."""
         self._pacer.reset()
         with prefetched(messages) as ahead:
@@ -101,7 +101,7 @@ class Player:
             self.progress.depths += 1
             self._answers.sent_depth(message.stamp_ns)
 
-    def _await_answers(self, message: Message | None, stop: threading.Event) -> bool:
+    def _await_answers(self, message: Message | None, stop: Stopping) -> bool:
         """Wait for what is due; images may be lost on the way and are sent again then."""
         if message is not None and message.role in (Role.COLOR, Role.DEPTH):
             self._recent.append(message)
@@ -119,7 +119,7 @@ class Player:
         )
         return True
 
-    def _wait(self, stop: threading.Event) -> bool:
+    def _wait(self, stop: Stopping) -> bool:
         """Wait for what is due, and until the first answer send what was sent again and again.
 
         Of two sides that discover each other one is first. A tracker that does not yet know each

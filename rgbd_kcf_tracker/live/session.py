@@ -8,6 +8,7 @@ Plain Python, one thread: the node's worker calls it; tests call it directly.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -23,6 +24,10 @@ Choice = Callable[[Frame], 'Box | None']
 """Finds the target in a frame: None to look again in the next. May raise an RgbdKcfError."""
 
 IDLE = Track(None, TrackState.IDLE)
+REQUESTS_SHARE = 0.2
+"""Share of the time that may go into starting on targets: a storm of requests leaves the rest."""
+REQUESTS_CREDIT_S = 0.3
+"""So much of it is saved up: a few requests in a row are met at once."""
 
 
 _warm: set[str] = set()
@@ -51,9 +56,16 @@ class Session:
         variant: name of the tracker.
         parameters: of that variant.
         report: told what went wrong with a request, in words for the user.
+        now: the wall clock in seconds, monotonic.
     """
 
-    def __init__(self, variant: str, parameters: Parameters, report: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        variant: str,
+        parameters: Parameters,
+        report: Callable[[str], None],
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._variant, self._parameters = variant, parameters
         self._wanted = (variant, parameters)
         self._tracker = create_tracker(variant, parameters)
@@ -61,6 +73,8 @@ class Session:
         self._choice: Choice | None = None
         self._auto: Choice | None = None
         self._auto_again = False
+        self._now = now
+        self._credit_s, self._credited = REQUESTS_CREDIT_S, now()
         self.track = IDLE
 
     @property
@@ -76,7 +90,17 @@ class Session:
     @property
     def choosing(self) -> bool:
         """Whether a target is to be chosen in the next frame."""
-        return self._choice is not None or self._auto_due()
+        return self.due or self._auto_due()
+
+    @property
+    def due(self) -> bool:
+        """Whether a target was asked for, and its turn has come."""
+        if self._choice is None:
+            return False
+        now = self._now()
+        saved = self._credit_s + (now - self._credited) * REQUESTS_SHARE
+        self._credit_s, self._credited = min(saved, REQUESTS_CREDIT_S), now
+        return self._credit_s > 0
 
     def choose_by_itself(self, auto: Choice | None, again: bool = False) -> None:
         """Ask ``auto`` for a target whenever there is none.
@@ -92,28 +116,43 @@ class Session:
         lost = state is TrackState.LOST and self._auto_again
         return self._auto is not None and (state is TrackState.IDLE or lost)
 
-    def choose(self, choice: Choice | None) -> None:
-        """Take the target that ``choice`` finds, from the next frame on; None waits no more."""
+    def choose(self, choice: Choice) -> None:
+        """Take the target that ``choice`` finds, from the next frame on, for what was asked before.
+
+        Where requests come so fast that starting takes more than :data:`REQUESTS_SHARE` of the
+        time, the newest waits for its turn.
+        """
         self._choice = choice
 
-    def start(self, frame: Frame, choice: Choice) -> bool:
-        """Take the target that ``choice`` finds in ``frame``, if it finds one there.
-
-        A choice that fails leaves the target that is followed, if any, and is reported.
-        """
+    def start_as_asked(self, frame: Frame) -> bool:
+        """Start on this frame, if that was asked; True where there is a new target."""
+        choice = self._choice
+        if not self.due or choice is None:
+            return False
+        self._choice = None
+        begun = self._now()
         try:
             box = choice(frame)
             if box is None:
-                return False
-            variant, parameters = self._wanted
-            tracker = create_tracker(variant, parameters)
+                self._choice = choice
+            return box is not None and self.start(frame, box)
+        except RgbdKcfError as error:
+            self._report(str(error))
+            return False
+        finally:
+            self._credit_s -= self._now() - begun
+
+    def start(self, frame: Frame, box: Box) -> bool:
+        """Take this target; where that fails, the one that is followed is kept, and it is said."""
+        variant, parameters = self._wanted
+        tracker = create_tracker(variant, parameters)
+        try:
             track = tracker.start(frame, box)
         except RgbdKcfError as error:
             self._report(str(error))
-            self._choice = None
             return False
         self._variant, self._parameters = variant, parameters
-        self._tracker, self.track, self._choice = tracker, track, None
+        self._tracker, self.track = tracker, track
         return True
 
     def reset(self) -> None:
@@ -133,11 +172,12 @@ class Session:
 
     def process(self, frame: Frame) -> Track:
         """Follow the target into the next frame, or start on it."""
-        choice = self._choice
-        if choice is None and self._auto_due():
-            choice = self._auto
-        if choice is not None and self.start(frame, choice):
+        if self.start_as_asked(frame):
             return self.track
+        if self._choice is None and self._auto is not None and self._auto_due():
+            found = self._auto(frame)
+            if found is not None and self.start(frame, found):
+                return self.track
         if self.track.state is not TrackState.IDLE:
             self.track = self._tracker.update(frame)
             self._take_over(frame)
@@ -150,7 +190,7 @@ class Session:
         if box.clipped(frame.width, frame.height) is None:
             return
         track = self.track
-        if self.start(frame, lambda _: box):
+        if self.start(frame, box):
             self.track = track
         else:
             self._wanted = (self._variant, self._parameters)

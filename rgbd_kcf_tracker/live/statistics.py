@@ -9,8 +9,29 @@ import threading
 import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Times(NamedTuple):
+    """Where the time of one answer went, in milliseconds.
+
+    Attributes:
+        latency: stamp to published result, by the node's clock.
+        work: complete pair to published result.
+        transport: stamp to complete pair: the camera, DDS, and the wait for the depth image.
+        waiting: complete pair to the worker's turn.
+        decode, track, publish: the worker's steps.
+    """
+
+    latency: float
+    work: float
+    transport: float
+    waiting: float
+    decode: float
+    track: float
+    publish: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +42,9 @@ class Snapshot:
         counts: all counters since the node was configured.
         recent: what was added to each since the last snapshot.
         seconds: time since the last snapshot.
-        latency_ms: stamp to published result: mean, median, p99 and largest of the last images;
-            empty where none was processed or stamps and clock have nothing to do with each other.
-        work_ms: arrival of the pair to published result, likewise.
+        times_ms: mean, median, p99 and largest of the last images, by the fields of
+            :class:`Times`; empty where none was processed, or where stamps and clock have nothing
+            to do with each other.
         last_error, error_age_s: the last fault in words, and how long ago.
         image_age_s: time since the last colour image came, None before the first.
         depth_age_s: likewise for depth.
@@ -32,8 +53,7 @@ class Snapshot:
     counts: dict[str, int]
     recent: dict[str, int]
     seconds: float
-    latency_ms: tuple[float, ...]
-    work_ms: tuple[float, ...]
+    times_ms: dict[str, tuple[float, ...]]
     last_error: str
     error_age_s: float | None
     image_age_s: float | None
@@ -55,8 +75,7 @@ class Statistics:
     _depth_time: float | None = None
 
     def __post_init__(self) -> None:
-        self._latencies: deque[float] = deque(maxlen=self.window)
-        self._work: deque[float] = deque(maxlen=self.window)
+        self._times: deque[Times] = deque(maxlen=self.window)
 
     def count(self, name: str, number: int = 1) -> None:
         """Add to a counter."""
@@ -88,12 +107,11 @@ class Statistics:
             self._last_error = text
             self._error_time = time.monotonic()
 
-    def processed(self, latency_ms: float, work_ms: float) -> None:
+    def processed(self, times: Times) -> None:
         """A pair was answered."""
         with self._lock:
             self._counts['processed'] += 1
-            self._latencies.append(latency_ms)
-            self._work.append(work_ms)
+            self._times.append(times)
 
     def snapshot(self) -> Snapshot:
         """The counts now; the next snapshot's ``recent`` starts here."""
@@ -104,8 +122,12 @@ class Statistics:
                 counts=dict(self._counts),
                 recent=dict(recent),
                 seconds=max(now - self._taken, 1e-6),
-                latency_ms=_summary([v for v in self._latencies if -1e3 < v < 6e4]),
-                work_ms=_summary(list(self._work)),
+                times_ms={
+                    name: _summary([v for v in values if -1e3 < v < 6e4])
+                    for name, values in zip(
+                        Times._fields, zip(*self._times, strict=True), strict=False
+                    )
+                },
                 last_error=self._last_error,
                 error_age_s=_age(now, self._error_time),
                 image_age_s=_age(now, self._image_time),

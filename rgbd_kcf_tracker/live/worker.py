@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import Generic, TypeVar
 
 T = TypeVar('T')
@@ -16,8 +17,9 @@ T = TypeVar('T')
 class Worker(Generic[T]):
     """Takes items one by one in its own thread: the newest, or all in order.
 
-    Calls (:meth:`call`) run in the same thread, before the next item, so that what they change
-    needs no lock.
+    Calls (:meth:`call`) run in the same thread, between items, so that what they change needs no
+    lock. Of calls of one kind that wait, only the last runs; so neither calls nor items can keep
+    the other from their turn.
 
     Args:
         work: does one item. It must not raise; what it raises goes to ``failed``.
@@ -38,11 +40,17 @@ class Worker(Generic[T]):
         self._failed = failed
         self._keep = keep
         self._items: deque[T] = deque()
-        self._calls: deque[Callable[[], None]] = deque()
+        self._calls: dict[str, Callable[[], None]] = {}
         self._condition = threading.Condition()
-        self._stopping = False
+        self._stopping = self._ended = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing that was given to this worker is still in work."""
+        with self._condition:
+            return self._ended
 
     def submit(self, *items: T) -> int:
         """Hand over items without waiting; returns how many older ones had to make room.
@@ -61,39 +69,54 @@ class Worker(Generic[T]):
             self._condition.notify()
         return dropped
 
-    def call(self, function: Callable[[], None]) -> None:
-        """Have a function called in the worker's thread, before the next item."""
+    def call(self, kind: str, function: Callable[[], None]) -> None:
+        """Have a function called in the worker's thread, before the next item.
+
+        It takes the place of a call of the same kind that still waits. Once the thread has ended,
+        the function is called here and now.
+        """
         with self._condition:
-            if not self._stopping:
-                self._calls.append(function)
+            if not self._ended:
+                self._calls.pop(kind, None)  # its successor comes after what was asked in between
+                self._calls[kind] = function
                 self._condition.notify()
+                return
+        self._guarded(function)
 
     def stop(self, timeout_s: float = 5.0) -> bool:
-        """Drop what waits, let the item in work end, and join; True when the thread has ended."""
+        """Drop the items that wait, and join; True when the thread has ended.
+
+        The item in work is finished, and so are all calls: who asked for something gets it.
+        """
         with self._condition:
             self._stopping = True
             self._items.clear()
-            self._calls.clear()
             self._condition.notify()
         if threading.current_thread() is not self._thread:
             self._thread.join(timeout_s)
-        return not self._thread.is_alive()
+        return self.ended
 
     def _run(self) -> None:
         while True:
             with self._condition:
                 while not (self._stopping or self._calls or self._items):
                     self._condition.wait()
-                if self._stopping:
+                calls, self._calls = self._calls, {}
+                if self._stopping and not calls:
+                    self._ended = True
                     return
-                call = self._calls.popleft() if self._calls else None
-                item = None if call else self._items.popleft()
-            try:
-                if call is not None:
-                    call()
-                elif item is not None:
-                    self._work(item)
-            except Exception as error:  # the thread must outlive any fault of one frame
-                self._failed(error)
+            for call in calls.values():
+                self._guarded(call)
+            with self._condition:
+                if not self._items:
+                    continue
+                item = self._items.popleft()
+            self._guarded(partial(self._work, item))
             # Keep no reference while waiting: an image pair is 10 MB.
-            call = item = None
+            del item
+
+    def _guarded(self, function: Callable[[], None]) -> None:
+        try:
+            function()
+        except Exception as error:  # the thread must outlive any fault of one frame
+            self._failed(error)

@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.recordings.pairing import (
     Pair,
     PairingCounts,
     StampPairer,
+    patient_pairer,
 )
 from rgbd_kcf_tracker.recordings.storage import Topic
 
@@ -100,7 +101,7 @@ def _oddities(
 def _run_pairer(
     events: list[tuple[bool, int, int]], tolerance_s: float
 ) -> tuple[list[FramePair], PairingCounts]:
-    pairer: StampPairer[int, int] = StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0)
+    pairer: StampPairer[int, int] = patient_pairer(tolerance_s)
     pairs: list[FramePair] = []
     for is_color, stamp, index in events:
         pairs += pairer.add_color(stamp, index) if is_color else pairer.add_depth(stamp, index)

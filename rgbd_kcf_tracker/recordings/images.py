@@ -202,10 +202,12 @@ def pixel_format(text: str) -> str:
 
 def metres_from_mm(values: npt.NDArray[np.uint16]) -> DepthImage:
     """Millimetres as float32 metres, 0 becoming NaN. Keeps the shape."""
-    out: DepthImage = np.multiply(values, _MILLIMETRE, dtype=np.float32)
-    # A zero's bits minus one are all ones, which is a NaN: ten times faster than a masked write.
-    bits = out.view(np.int32)
-    np.subtract(bits, values == 0, out=bits, casting='unsafe')
+    out: DepthImage = values.astype(np.float32)
+    # Times itself by itself: 1, and NaN for 0. Ten times faster than a masked write.
+    with np.errstate(invalid='ignore'):
+        ones = np.divide(out, out)
+    out *= ones
+    out *= _MILLIMETRE
     return out
 
 

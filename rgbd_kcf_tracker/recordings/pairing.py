@@ -169,6 +169,11 @@ class StampPairer(Generic[C, D]):
         """Colour and depth messages held at the moment."""
         return len(self._colors), len(self._depths)
 
+    @property
+    def waiting_colors(self) -> frozenset[int]:
+        """Stamps of the colour messages that wait."""
+        return frozenset(self._colors)
+
     def _decide(self) -> list[Pair[C, D]]:
         out: list[Pair[C, D]] = []
         while self._colors:
@@ -246,6 +251,15 @@ class StampPairer(Generic[C, D]):
         for depth in [d for d in self._depths if d > stamp]:
             del self._depths[depth]
             self.counts.depth_alone += 1
+
+
+def patient_pairer(tolerance_s: float = DEFAULT_TOLERANCE_S) -> StampPairer[C, D]:
+    """The pairer for where every pair counts and time does not: recordings, and lock-step.
+
+    Stamps alone decide, however late one stream is: the tracker, the replay node that waits for its
+    answers, and the reader of recordings must agree on what is a pair.
+    """
+    return StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0)
 
 
 class _Clock:

@@ -32,6 +32,7 @@ class NodeState:
         publishers, depth_publishers: how many publish there.
         stale_after: seconds without images that make a silent camera.
         uses_depth: whether the variant wants depth at all.
+        depth_fault: why no depth fits, in words; empty where it does.
     """
 
     name: str
@@ -44,6 +45,7 @@ class NodeState:
     depth_publishers: int = 0
     stale_after: float = 2.0
     uses_depth: bool = True
+    depth_fault: str = ''
 
 
 def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
@@ -53,19 +55,13 @@ def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
     silent = _silence(state, snapshot)
     if silent:
         return DiagnosticStatus.ERROR, silent
-    if snapshot.error_age_s is not None and snapshot.error_age_s < RECENT_ERROR_S:
-        return DiagnosticStatus.WARN, snapshot.last_error
-    recent = snapshot.recent
-    came = max(recent.get('color_received', 0), 1)
-    if recent.get('dropped', 0) > ALARMING_SHARE * came:
-        return (
-            DiagnosticStatus.WARN,
-            f'tracking is slower than the camera: {recent["dropped"]} of {came} images dropped',
-        )
-    if state.uses_depth:
-        alone = recent.get('color_without_depth', 0)
-        if alone > ALARMING_SHARE * came:
-            return DiagnosticStatus.WARN, _without_depth(state, snapshot, alone, came)
+    age = snapshot.error_age_s
+    error = snapshot.last_error if age is not None and age < RECENT_ERROR_S else ''
+    came = max(snapshot.recent.get('color_received', 0), 1)
+    # Images that wait for a depth that never comes are dropped too: the cause is said first.
+    wrong = [error, _without_depth(state, snapshot, came), _dropped(snapshot, came)]
+    if any(wrong):
+        return DiagnosticStatus.WARN, '; '.join(text for text in wrong if text)
     return DiagnosticStatus.OK, state.track.name
 
 
@@ -82,12 +78,24 @@ def _silence(state: NodeState, snapshot: Snapshot) -> str:
     )
 
 
-def _without_depth(state: NodeState, snapshot: Snapshot, alone: int, came: int) -> str:
+def _dropped(snapshot: Snapshot, came: int) -> str:
+    dropped = snapshot.recent.get('dropped', 0)
+    if dropped <= ALARMING_SHARE * came:
+        return ''
+    return f'tracking is slower than the camera: {dropped} of {came} images dropped'
+
+
+def _without_depth(state: NodeState, snapshot: Snapshot, came: int) -> str:
+    alone = snapshot.recent.get('color_without_depth', 0)
+    if not state.uses_depth or alone <= ALARMING_SHARE * came:
+        return ''
     if state.depth_publishers == 0:
         return f'nobody publishes {state.depth_topic}: tracking on colour alone'
     age = snapshot.depth_age_s
     if age is None or age > state.stale_after:
         return f'no depth image on {state.depth_topic}: tracking on colour alone'
+    if state.depth_fault:
+        return f'tracking on colour alone: {state.depth_fault}'
     return (
         f'{alone} of {came} colour images found no depth of their time: are the streams '
         'synchronised (see pair_tolerance)?'
@@ -104,7 +112,7 @@ def diagnostics_message(stamp: Time, state: NodeState, snapshot: Snapshot) -> Di
         'rate_hz': f'{snapshot.recent.get("processed", 0) / snapshot.seconds:.1f}',
         'input_rate_hz': f'{snapshot.recent.get("color_received", 0) / snapshot.seconds:.1f}',
     }
-    for what, summary in (('latency', snapshot.latency_ms), ('work', snapshot.work_ms)):
+    for what, summary in snapshot.times_ms.items():
         for name, value in zip(LATENCY_NAMES, summary, strict=False):
             values[f'{what}_{name}_ms'] = f'{value:.2f}'
     values |= {name: str(number) for name, number in sorted(snapshot.counts.items())}

@@ -4,12 +4,14 @@
 """The tracker's parameters as ROS parameters: declared, described, checked, and settable live.
 
 A plain node dies with a traceback when a double is given as an integer or an override is out of its
-range. Here an integer is taken for a double, and a bad override leaves the default and a message.
+range, and ignores a name that it does not know. Here an integer is taken for a double, and all that
+is wrong with what a node was started with is said in one error.
 """
 
 from __future__ import annotations
 
 import contextlib
+import difflib
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
@@ -32,33 +34,70 @@ ROS_NAMES = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 """Parameters that rclpy itself declares: an override of these is none of ours."""
 
 
+DECLARE_OVERRIDES: Any = {'automatically_declare_parameters_from_overrides': True}
+"""Options of a node whose overrides :func:`declare_all` reads: rclpy has no other public view."""
+
+
+def declare_all(
+    node: Node, infos: Mapping[str, ParameterInfo], read_only: Callable[[str], bool]
+) -> None:
+    """Declare parameters with the values that the node was started with.
+
+    Args:
+        node: made with :data:`DECLARE_OVERRIDES`.
+        infos: the parameters by their names.
+        read_only: whether a parameter can be set at start alone.
+
+    Raises:
+        ParameterError: naming everything that is unknown, of the wrong type or out of range.
+    """
+    names = [name for name in node.get_parameters_by_prefix('') if not name.startswith(ROS_NAMES)]
+    given = {name: node.get_parameter(name).value for name in names}
+    values: dict[str, Scalar] = {}
+    problems = []
+    if not isinstance(node.get_parameter('use_sim_time').value, bool):
+        problems.append('parameter use_sim_time must be true or false')
+    for name, value in given.items():
+        node.undeclare_parameter(name)
+        if name not in infos:
+            problems.append(_unknown(name, infos))
+            continue
+        try:
+            values[name] = coerced(infos[name], value)
+        except ParameterError as error:
+            problems.append(str(error))
+    if problems:
+        raise ParameterError('; '.join(problems))
+    for name, info in infos.items():
+        described = descriptor(info)
+        described.read_only = read_only(name)
+        node.declare_parameter(
+            name, values.get(name, info.default), described, ignore_override=True
+        )
+
+
+def _unknown(name: str, infos: Iterable[str]) -> str:
+    near = difflib.get_close_matches(name, infos, n=1)
+    known = f'did you mean {near[0]!r}?' if near else f'known are {", ".join(infos)}'
+    return f'unknown parameter {name!r}: {known}'
+
+
 class ParameterServer:
     """Declares all parameters on a node and hands out checked dataclasses.
 
     Args:
-        node: the node to declare on.
+        node: the node to declare on, made with :data:`DECLARE_OVERRIDES`.
         changed: called with the names after parameters were set while running.
 
-    Attributes:
-        problems: what was wrong with the overrides that the node was started with.
+    Raises:
+        ParameterError: where the node was started with what is no value of its parameters.
     """
 
     def __init__(self, node: Node, changed: Callable[[frozenset[str]], None]) -> None:
         self._node = node
         self._changed = changed
         self._infos = {info.name: info for info in all_parameters()}
-        self.problems: list[str] = []
-        # rclpy offers no public view of the overrides that belong to undeclared parameters.
-        overrides: Mapping[str, Parameter] = getattr(node, '_parameter_overrides', {})
-        for info in self._infos.values():
-            value = info.default
-            if info.name in overrides:
-                try:
-                    value = coerced(info, overrides[info.name].value)
-                except ParameterError as error:
-                    self.problems.append(f'{error}; using {info.default!r}')
-            node.declare_parameter(info.name, value, descriptor(info), ignore_override=True)
-        self._note_unknown(overrides)
+        declare_all(node, self._infos, READ_ONLY.__contains__)
         node.add_pre_set_parameters_callback(self._before_set)
         node.add_on_set_parameters_callback(self._on_set)
         node.add_post_set_parameters_callback(self._after_set)
@@ -76,13 +115,6 @@ class ParameterServer:
         return {
             info.name: self._node.get_parameter(prefix + info.name).value for info in describe(cls)
         }
-
-    def _note_unknown(self, overrides: Mapping[str, Parameter]) -> None:
-        for name in overrides:
-            if name not in self._infos and not name.startswith(ROS_NAMES):
-                self.problems.append(
-                    f'unknown parameter {name!r} is ignored: see `ros2 param list` for the names'
-                )
 
     def _before_set(self, parameters: Sequence[Parameter]) -> list[Parameter]:
         """Take an integer for a double and a list for a box, before rclpy compares the types."""
@@ -134,7 +166,6 @@ def descriptor(info: ParameterInfo) -> ParameterDescriptor:
     described = ParameterDescriptor(
         name=info.name,
         description=info.description + unit,
-        read_only=info.name in READ_ONLY,
     )
     if info.choices:
         described.additional_constraints = f'one of: {", ".join(info.choices)}'

@@ -1,33 +1,26 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a node's process needs around the node: signals, and a loop that holds.
-
-SIGINT and SIGTERM end the loop; a second SIGINT (``ros2 launch`` sends one too, beside the
-terminal's) cannot interrupt the clean-up.
-"""
+"""What a node's process needs around the node: arguments, signals, and a loop that holds."""
 
 from __future__ import annotations
 
-import signal
+import argparse
+import re
 import sys
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, TypeVar
 
-import rclpy
-from rclpy.executors import (
-    Executor,
-    ExternalShutdownException,
-    ShutdownException,
-    SingleThreadedExecutor,
-)
-from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.live.stopping import Stop
 
-from rgbd_kcf_tracker.live.memory import keep_large_blocks
+if TYPE_CHECKING:
+    from rclpy.executors import Executor
+    from rclpy.node import Node
 
-__all__ = ['keep_large_blocks', 'run', 'spin']
+N = TypeVar('N', bound='Node')
 
+USER_MISTAKE, FAILURE = 2, 1
 _SPIN_PERIOD_S = 0.1
 
 
@@ -37,6 +30,8 @@ def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
     A message whose strings are no UTF-8, or a lifecycle request that does not fit the state, raises
     inside rclpy: it must not end the node.
     """
+    from rclpy.executors import ExternalShutdownException, ShutdownException
+
     while not stopped() and executor.context.ok():
         try:
             executor.spin_once(timeout_sec=_SPIN_PERIOD_S)
@@ -46,36 +41,90 @@ def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
             node.get_logger().error(f'{type(error).__name__}: {error}')
 
 
-def run(make: Callable[[], Node], args: list[str] | None = None) -> int:
-    """Start ROS, make a node, and let it live until a signal; returns the exit status.
+def asks_for_help(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> bool:
+    """Print the help where it is asked for, wherever among ROS's arguments; starts nothing."""
+    given = sys.argv[1:] if arguments is None else arguments
+    if not {'-h', '--help'} & set(given):
+        return False
+    parser.print_help()
+    return True
+
+
+def node_parser(program: str, description: str, example: str) -> argparse.ArgumentParser:
+    """The command line of a node's executable: it takes ROS's arguments alone."""
+    return argparse.ArgumentParser(
+        prog=program,
+        usage=f'{program} [-h] [--ros-args [-p NAME:=VALUE] [-r FROM:=TO] [--params-file FILE]]',
+        description=description,
+        epilog=f'Example: {example}. Parameters: docs/parameters.md, or `ros2 param list`.',
+    )
+
+
+def run(
+    parser: argparse.ArgumentParser,
+    make: Callable[[], N],
+    live: Callable[[Executor, N], None],
+    stop: Stop,
+    arguments: Sequence[str] | None = None,
+) -> int:
+    """Start ROS, make a node and let it live; returns the exit status.
 
     Args:
-        make: makes the node; an error that it raises is printed, and the status is 1.
-        args: the command line, sys.argv where None.
+        parser: of the executable.
+        make: makes the node.
+        live: returns when the node's time is over.
+        stop: asked between the steps of starting.
+        arguments: the command line without the program, that of the process where None.
+
+    Returns:
+        0 at the end or when told to stop, 2 for what the user can mend, 1 for any other failure.
     """
-    stop: list[int] = []
-
-    def on_signal(number: int, _: Any) -> None:
-        stop.append(number)
-
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
-    executor = SingleThreadedExecutor()
-    node: Node | None = None
-    try:
-        node = make()
-        executor.add_node(node)
-        spin(executor, node, lambda: bool(stop))
+    if asks_for_help(parser, arguments):
         return 0
-    except Exception as error:
-        print(f'cannot start: {error}', file=sys.stderr)
-        return 1
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    argv = [parser.prog, *(sys.argv[1:] if arguments is None else arguments)]
+    if stop.is_set():
+        return 0
+    try:
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy has no common class for arguments that it cannot use
+        return _failed(parser, error, USER_MISTAKE)
+    node: N | None = None
+    executor: Executor | None = None
+    try:
+        # After rclpy's own check, which knows what belongs to ROS.
+        unknown = remove_ros_args(argv)[1:]
+        if unknown:
+            raise RgbdKcfError(
+                f'unknown argument {unknown[0]!r}: give parameters as --ros-args -p name:=value'
+            )
+        executor = SingleThreadedExecutor()
+        if not stop.is_set():
+            node = make()
+            executor.add_node(node)
+            live(executor, node)
+        return 0
+    except RgbdKcfError as error:
+        return _failed(parser, error, USER_MISTAKE)
+    except Exception as error:  # also rclpy's: a node name, a namespace, a domain that is taken
+        return _failed(parser, error, FAILURE)
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)
+        stop.ignore()
+        if executor is not None:
+            executor.shutdown(timeout_sec=0.5)
         if node is not None:
-            executor.remove_node(node)
             node.destroy_node()
-        executor.shutdown(timeout_sec=0.5)
         rclpy.try_shutdown()
+
+
+def _failed(parser: argparse.ArgumentParser, error: Exception, status: int) -> int:
+    # Where in rcl's sources it was noticed helps nobody.
+    text = re.sub(r',? at [^ ]+\.[ch]pp:\d+|,? at [^ ]+\.c:\d+', '', ' '.join(str(error).split()))
+    if not text or text.startswith('['):
+        text = f'{type(error).__name__} {text}'
+    print(f'{parser.prog}: {text}', file=sys.stderr)
+    return status

@@ -9,6 +9,7 @@ import importlib
 from typing import Any
 
 from geometry_msgs.msg import PointStamped, PolygonStamped
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Image, RegionOfInterest
@@ -33,6 +34,9 @@ RESULT_DEPTH = 100
 IMAGE_DEPTH = 2
 MARKER_LIFETIME_S = 0.5
 CLASS_ID = 'target'
+NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
+"""Each event that somebody could wait for costs the executor some 10 us with each message of any
+topic; the defaults, two for each topic, only log a QoS that does not fit."""
 
 
 def vision_messages() -> Any | None:
@@ -53,7 +57,7 @@ class TrackPublishers:
         self._all: list[Any] = []
 
         def publisher(kind: Any, topic: str, qos: QoSProfile) -> Any:
-            made = node.create_lifecycle_publisher(kind, topic, qos)
+            made = node.create_lifecycle_publisher(kind, topic, qos, event_callbacks=NO_EVENTS)
             self._all.append(made)
             return made
 

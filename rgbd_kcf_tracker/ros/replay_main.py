@@ -5,75 +5,60 @@
 
 from __future__ import annotations
 
-import contextlib
-import signal
 import sys
-import threading
-from types import FrameType
-from typing import Any
 
-from rgbd_kcf_tracker.live.memory import keep_large_blocks
+from rgbd_kcf_tracker.live.stopping import Stop
 
+TYPE_CHECKING = False  # that of typing costs an import
+if TYPE_CHECKING:
+    from rclpy.executors import Executor
 
-def main(args: list[str] | None = None) -> int:
-    """Replay a recording; 0 at its end or when told to stop, 2 for what the user can mend."""
-    keep_large_blocks()  # before NumPy and ROS allocate
-    import rclpy
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.signals import SignalHandlerOptions
-
-    from rgbd_kcf_tracker.errors import RgbdKcfError
     from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+HOW_TO_GET = (
+    'which reads bags and is not in apt: python3 -m pip install --user --break-system-packages '
+    'rosbags mcap mcap-ros2-support (docs/install.md)'
+)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Replay a recording; 0 at its end or when told to stop, 2 for what the user can mend."""
+    stop = Stop()  # first of all: what follows takes a second
+    import threading
+
+    from rgbd_kcf_tracker.live.memory import keep_large_blocks
+    from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
-    stop = _stop_on_signals()
-    ensure_image_transport()
+    parser = node_parser(
+        'replay',
+        'Publish a recording as if its camera were there (a ROS 2 node).',
+        'replay --ros-args -p bag:=walk.mcap -p lockstep:=true',
+    )
+    if asks_for_help(parser, arguments):
+        return 0
+    keep_large_blocks()  # before NumPy and ROS allocate
+    ensure_image_transport()  # before Fast DDS reads its settings
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:  # rclpy has no common class for arguments that it cannot parse
-        print(f'replay: {error}', file=sys.stderr)
+        from rgbd_kcf_tracker.ros.replay_node import ReplayNode
+    except ModuleNotFoundError as error:
+        if error.name not in ('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'):
+            raise
+        print(f'replay: {error.name} is missing, {HOW_TO_GET}', file=sys.stderr)
         return 2
-    node: ReplayNode | None = None
-    executor = SingleThreadedExecutor()
-    spinning = threading.Thread(target=_spin, args=(executor,), name='spin', daemon=True)
-    try:
-        node = ReplayNode()
-        executor.add_node(node)
+
+    def live(executor: Executor, node: ReplayNode) -> None:
+        ended = threading.Event()
+        spinning = threading.Thread(
+            target=spin, args=(executor, node, ended.is_set), name='spin', daemon=True
+        )
         spinning.start()
-        node.run(stop)
-    except RgbdKcfError as error:
-        if node is None:
-            print(f'replay: {error}', file=sys.stderr)
-        else:
-            node.get_logger().fatal(str(error))
-        return 2
-    finally:
-        executor.shutdown(timeout_sec=1.0)
-        if spinning.is_alive():
+        try:
+            node.run(stop)
+        finally:
+            ended.set()
             spinning.join(timeout=1.0)
-        if node is not None:
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
 
-
-def _spin(executor: Any) -> None:
-    from rclpy.executors import ExternalShutdownException
-
-    with contextlib.suppress(ExternalShutdownException):
-        executor.spin()
-
-
-def _stop_on_signals() -> threading.Event:
-    """An event that SIGINT and SIGTERM set, however often they come."""
-    stop = threading.Event()
-
-    def handler(number: int, frame: FrameType | None) -> None:
-        stop.set()
-
-    signal.signal(signal.SIGINT, handler)
-    signal.signal(signal.SIGTERM, handler)
-    return stop
+    return run(parser, ReplayNode, live, stop, arguments)
 
 
 if __name__ == '__main__':

@@ -8,7 +8,6 @@ from __future__ import annotations
 import importlib
 import json
 import os
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ import numpy as np
 from geometry_msgs.msg import PolygonStamped
 from rclpy.duration import Duration
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
@@ -28,9 +26,10 @@ from rgbd_kcf_tracker.live.replay_pacing import Pacer
 from rgbd_kcf_tracker.live.replay_player import Player
 from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.live.replay_source import ReplaySource
-from rgbd_kcf_tracker.parameters import checked, describe
+from rgbd_kcf_tracker.live.stopping import Stopping
+from rgbd_kcf_tracker.parameters import describe
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
-from rgbd_kcf_tracker.ros.parameters import ROS_NAMES, descriptor
+from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
 SETTLE_S = 0.3
 """From the moment that both sides know of each other to the first image: discovery is one-sided."""
@@ -45,7 +44,7 @@ class ReplayNode(Node):
     """
 
     def __init__(self) -> None:
-        super().__init__('replay')
+        super().__init__('replay', **DECLARE_OVERRIDES)
         self.parameters = self._read_parameters()
         self._publishers_by_topic: dict[str, Any] = {}
         self._clock_publisher: Any = None
@@ -55,26 +54,11 @@ class ReplayNode(Node):
             self._clock_publisher = self.create_publisher(Clock, '/clock', qos)
 
     def _read_parameters(self) -> ReplayParameters:
-        # An override of the wrong type or out of range would end in rclpy's traceback, so rclpy is
-        # kept from applying them. It offers no public view of them.
-        overrides: dict[str, Parameter] = dict(getattr(self, '_parameter_overrides', {}))
         infos = {info.name: info for info in describe(ReplayParameters)}
-        unknown = [n for n in overrides if n not in infos and not n.startswith(ROS_NAMES)]
-        if unknown:
-            raise ParameterError(
-                f'unknown parameter {unknown[0]!r}: choose from {", ".join(infos)}'
-            )
-        values = {}
-        for name, info in infos.items():
-            values[name] = info.default
-            if name in overrides:
-                values[name] = checked(info, overrides[name].value)
-            described = descriptor(info)
-            described.read_only = True
-            self.declare_parameter(name, values[name], described, ignore_override=True)
-        return ReplayParameters(**values)  # type: ignore[arg-type]
+        declare_all(self, infos, lambda _: True)
+        return ReplayParameters(**{name: self.get_parameter(name).value for name in infos})
 
-    def run(self, stop: threading.Event) -> None:
+    def run(self, stop: Stopping) -> None:
         """Replay as the parameters say; returns at the end or soon after ``stop`` is set.
 
         Raises:
@@ -123,7 +107,7 @@ class ReplayNode(Node):
         if self._answers is not None:
             self._answers.answered(stamp_to_ns(message.header.stamp))
 
-    def _await_subscribers(self, source: ReplaySource, stop: threading.Event) -> None:
+    def _await_subscribers(self, source: ReplaySource, stop: Stopping) -> None:
         """Wait until the images are heard, and in lock-step until the tracker can answer."""
         parameters = self.parameters
         names = [n for n in (source.color_topic, source.depth_topic) if n is not None]
@@ -145,7 +129,7 @@ class ReplayNode(Node):
                 if parameters.lockstep:
                     raise ParameterError(
                         f'nobody subscribes to {topics} and answers on {parameters.answer_topic}: '
-                        'start the tracker with its inputs remapped to these topics'
+                        + (self._answer_hint() or 'start the tracker with its inputs remapped')
                     )
                 if parameters.wait_for_subscribers:
                     self.get_logger().warning(f'nobody subscribes to {topics}: playing anyway')
@@ -157,7 +141,19 @@ class ReplayNode(Node):
                 return
         stop.wait(SETTLE_S)
 
-    def _play(self, source: ReplaySource, answers: Answers, stop: threading.Event) -> None:
+    def _answer_hint(self) -> str:
+        """Where trackers of another name or namespace answer, if that is not the answer_topic."""
+        if self.count_publishers(self.parameters.answer_topic):
+            return ''
+        kind = 'geometry_msgs/msg/PolygonStamped'
+        heard = [
+            name
+            for name, types in self.get_topic_names_and_types()
+            if kind in types and name.endswith('/box') and self.count_publishers(name)
+        ]
+        return f'set answer_topic, for there is {", ".join(sorted(heard))}' if heard else ''
+
+    def _play(self, source: ReplaySource, answers: Answers, stop: Stopping) -> None:
         parameters = self.parameters
         info = source.first_info() if parameters.lockstep else None
         player = Player(
@@ -192,6 +188,9 @@ class ReplayNode(Node):
         answers.give_up()
         figures = figures_of(player, answers, seconds)
         self.get_logger().info(summary(figures))
+        hint = self._answer_hint() if parameters.answer_topic and not figures['answers'] else ''
+        if hint:
+            self.get_logger().warning(f'no answers on {parameters.answer_topic}: {hint}')
         if parameters.report:
             write_report(Path(parameters.report), figures)
 

@@ -25,6 +25,8 @@ from rgbd_kcf_tracker.ros.messages import box_from_roi
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.live.auto_init import AutoInit
 
+CHOICE = 'choice'
+
 
 class Requests:
     """Turns messages and parameters into choices for the session, in the worker's thread.
@@ -32,7 +34,7 @@ class Requests:
     Args:
         processor: whose session it is.
         settings: the node's parameters as they stand.
-        in_worker: has a function called in the worker's thread.
+        in_worker: has a function called in the worker's thread; the last of its kind counts.
         fault: told of a request that cannot be met, by kind and in words.
     """
 
@@ -40,7 +42,7 @@ class Requests:
         self,
         processor: Processor,
         settings: Callable[[], NodeParameters],
-        in_worker: Callable[[Callable[[], None]], None],
+        in_worker: Callable[[str, Callable[[], None]], None],
         fault: Callable[[str, str], None],
     ) -> None:
         self._processor, self._session = processor, processor.session
@@ -65,7 +67,7 @@ class Requests:
 
     def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """``~/reset``: drop the target."""
-        self._in_worker(self._session.reset)
+        self._in_worker('reset', self._session.reset)
         response.success, response.message = True, 'target dropped'
         return response
 
@@ -74,7 +76,7 @@ class Requests:
         if 'init_box' in names:
             box = parse_box(self._settings().init_box)
             if box is not None:
-                self._in_worker(lambda: self._session.choose(lambda _: box))
+                self._in_worker(CHOICE, lambda: self._session.choose(lambda _: box))
         if any(name.startswith('auto_init') for name in names):
             settings = self._settings()
             auto: AutoInit | None = None
@@ -89,11 +91,11 @@ class Requests:
                         'depth alone',
                     )
             again = settings.auto_init_again
-            self._in_worker(lambda: self._session.choose_by_itself(auto, again))
+            self._in_worker('auto_init', lambda: self._session.choose_by_itself(auto, again))
 
     def _choose(self, choice: Choice) -> None:
         oldest_s = self._settings().stale_after
-        self._in_worker(lambda: self._processor.choose(choice, oldest_s))
+        self._in_worker(CHOICE, lambda: self._processor.choose(choice, oldest_s))
 
     def _on_restart(self) -> None:
         """The stamps went back for good, as a loop does (in the worker's thread)."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -18,6 +19,8 @@ from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParamet
 
 COLOR, DEPTH, CAMERA_INFO = 'color/image', 'depth/image', 'color/camera_info'
 REQUEST_DEPTH = 10
+NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
+"""They cost time with each message (see publishers), and diagnostics say what is silent."""
 
 
 class Subscriptions:
@@ -58,16 +61,30 @@ class Subscriptions:
                 kind = CompressedImage
                 name = f'{node.resolve_topic_name(topic)}/{transport}'
             made = node.create_subscription(
-                kind, name, callback, qos, qos_overriding_options=overriding
+                kind,
+                name,
+                callback,
+                qos,
+                event_callbacks=NO_EVENTS,
+                qos_overriding_options=overriding,
             )
             self._topics[topic] = made.topic_name
             self._all.append(made)
         info = node.create_subscription(
-            CameraInfo, CAMERA_INFO, camera_info, qos, qos_overriding_options=overriding
+            CameraInfo,
+            CAMERA_INFO,
+            camera_info,
+            qos,
+            event_callbacks=NO_EVENTS,
+            qos_overriding_options=overriding,
         )
         self._topics[CAMERA_INFO] = info.topic_name
-        request = node.create_subscription(RegionOfInterest, '~/init', init, REQUEST_DEPTH)
-        point = node.create_subscription(PointStamped, '~/init_point', init_point, REQUEST_DEPTH)
+        request = node.create_subscription(
+            RegionOfInterest, '~/init', init, REQUEST_DEPTH, event_callbacks=NO_EVENTS
+        )
+        point = node.create_subscription(
+            PointStamped, '~/init_point', init_point, REQUEST_DEPTH, event_callbacks=NO_EVENTS
+        )
         self._all += [info, request, point]
 
     def topic(self, name: str) -> str:

@@ -7,24 +7,42 @@ from __future__ import annotations
 
 import sys
 
-from rgbd_kcf_tracker.live.memory import keep_large_blocks
-from rgbd_kcf_tracker.ros.transport import ensure_image_transport
+from rgbd_kcf_tracker.live.stopping import Stop
+
+TYPE_CHECKING = False  # that of typing costs an import
+if TYPE_CHECKING:
+    from rclpy.executors import Executor
+
+SWITCH_INTERVAL_S = 0.0005
+"""Seconds. The executor's thread and the worker's wait for each other's hold on the interpreter:
+with Python's default, ten times as long (docs/live.md)."""
 
 
-def main(args: list[str] | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the tracker node until SIGINT or SIGTERM."""
+    stop = Stop()  # first of all: what follows takes a second
+    from rgbd_kcf_tracker.live.memory import keep_large_blocks
+    from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
+    from rgbd_kcf_tracker.ros.transport import ensure_image_transport
+
+    parser = node_parser(
+        'tracker',
+        'Follow one target in the colour and depth images of a camera (a managed ROS 2 node).',
+        'tracker --ros-args -p variant:=kcf -r color/image:=/camera/color/image_raw',
+    )
+    if asks_for_help(parser, arguments):
+        return 0
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     keep_large_blocks()  # before NumPy, OpenCV and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings
-    from rgbd_kcf_tracker.ros.process import run
     from rgbd_kcf_tracker.ros.tracker_node import TrackerNode
 
-    def make() -> TrackerNode:
-        node = TrackerNode()
+    def live(executor: Executor, node: TrackerNode) -> None:
         if node.settings.autostart:
             node.autostart()
-        return node
+        spin(executor, node, stop.is_set)
 
-    return run(make, args)
+    return run(parser, TrackerNode, live, stop, arguments)
 
 
 if __name__ == '__main__':

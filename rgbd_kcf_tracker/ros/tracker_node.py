@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
@@ -31,8 +32,8 @@ from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
-from rgbd_kcf_tracker.ros.parameters import ParameterServer
-from rgbd_kcf_tracker.ros.publishers import TrackPublishers
+from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
+from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
 from rgbd_kcf_tracker.ros.requests import Requests
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
 from rgbd_kcf_tracker.track import TrackState
@@ -50,10 +51,13 @@ class TrackerNode(LifecycleNode):
     Args:
         name: of the node.
         options: passed on to rclpy's node (``parameter_overrides``, ``namespace``, ...).
+
+    Raises:
+        ParameterError: where it is started with an unknown parameter or a value out of range.
     """
 
     def __init__(self, name: str = 'tracker', **options: Any) -> None:
-        super().__init__(name, **options)
+        super().__init__(name, **DECLARE_OVERRIDES, **options)
         self.statistics = Statistics()
         self._session: Session | None = None
         self._processor: Processor | None = None
@@ -64,13 +68,16 @@ class TrackerNode(LifecycleNode):
         self._inputs: Subscriptions | None = None
         self._reset_service: Any = None
         self._logged: dict[str, float] = {}
-        self._parameters_server = ParameterServer(self, self._parameters_changed)
-        for problem in self._parameters_server.problems:
-            self.statistics.error('bad_parameters', problem)
-            self.get_logger().error(problem)
+        try:
+            self._parameters_server = ParameterServer(self, self._parameters_changed)
+        except RgbdKcfError:
+            super().destroy_node()
+            raise
         self._settings = self._parameters_server.node_parameters()
         # Diagnostics speak in every lifecycle state, so theirs is a plain publisher.
-        self._diagnostics = Node.create_publisher(self, DiagnosticArray, '/diagnostics', 10)
+        self._diagnostics = Node.create_publisher(
+            self, DiagnosticArray, '/diagnostics', 10, event_callbacks=NO_EVENTS
+        )
         # Timers on the node's own clock would stand still while recorded time does.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics_timer = self.create_timer(
@@ -83,7 +90,7 @@ class TrackerNode(LifecycleNode):
 
     def _answer_impossible_transitions(self) -> None:
         """Refuse a transition that does not fit the state; rclpy raises and leaves no answer."""
-        service = self._service_change_state
+        service = self._own_service(ChangeState)
         change = service.callback
 
         def guarded(request: Any, response: Any) -> Any:
@@ -96,15 +103,27 @@ class TrackerNode(LifecycleNode):
 
         service.callback = guarded
 
+    def _lifecycle(self) -> str:
+        """Label of the lifecycle state, as anybody may ask for it: rclpy's only public way."""
+        answer = self._own_service(GetState).callback(GetState.Request(), GetState.Response())
+        return str(answer.current_state.label)
+
+    def _own_service(self, kind: Any) -> Any:
+        return next(service for service in self.services if service.srv_type is kind)
+
     @property
     def settings(self) -> NodeParameters:
         """The node's own parameters as they stand."""
         return self._settings
 
     def autostart(self) -> None:
-        """Configure and activate without a lifecycle manager."""
-        if self.trigger_configure() == SUCCESS:
-            self.trigger_activate()
+        """Configure and activate without a lifecycle manager.
+
+        Raises:
+            RgbdKcfError: where that fails.
+        """
+        if self.trigger_configure() != SUCCESS or self.trigger_activate() != SUCCESS:
+            raise RgbdKcfError(self.statistics.snapshot().last_error)
 
     # --- lifecycle -------------------------------------------------------------------------------
 
@@ -134,7 +153,7 @@ class TrackerNode(LifecycleNode):
             self._reset_service = self.create_service(Trigger, '~/reset', self._requests.reset)
             self._requests.from_parameters(frozenset({'init_box', 'auto_init'}))
         except Exception as error:  # rclpy would hide it
-            self.get_logger().error(f'cannot configure: {error}')
+            self._cannot(f'cannot configure: {error}')
             self._take_down()
             return FAILURE
         return super().on_configure(state)
@@ -142,6 +161,12 @@ class TrackerNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Listen to the camera and start the worker."""
         if self._processor is None or self._requests is None:
+            return FAILURE
+        if self._worker is not None and not self._worker.ended:
+            self._cannot(
+                'cannot activate: the tracker is still busy with an image from before; try again, '
+                'or clean up'
+            )
             return FAILURE
         settings = self._settings
         try:
@@ -166,7 +191,7 @@ class TrackerNode(LifecycleNode):
                 init_point=self._requests.init_point,
             )
         except Exception as error:  # rclpy would hide it
-            self.get_logger().error(f'cannot activate: {error}')
+            self._cannot(f'cannot activate: {error}')
             self._stop_listening()
             return FAILURE
         self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
@@ -204,9 +229,8 @@ class TrackerNode(LifecycleNode):
         if self._inputs is not None:
             self._inputs.destroy()
             self._inputs = None
-        if self._worker is not None:
-            self._worker.stop()
-            self._worker = None
+        if self._worker is not None and not self._worker.stop():
+            self.get_logger().error('the tracker is still busy with an image: left behind')
         self._intake = None
 
     def _take_down(self) -> None:
@@ -216,7 +240,8 @@ class TrackerNode(LifecycleNode):
         if self._reset_service is not None:
             self.destroy_service(self._reset_service)
             self._reset_service = None
-        self._session = self._processor = self._requests = None
+        # A worker that is still busy keeps the session that it has; the next one is another.
+        self._session = self._processor = self._requests = self._worker = None
 
     # --- receiving: store only -------------------------------------------------------------------
 
@@ -269,11 +294,11 @@ class TrackerNode(LifecycleNode):
         session = self._session
         if session is not None and any(n == 'variant' or '.' in n for n in names):
             parameters = self._parameters_server.variant_parameters(variant)
-            self._in_worker(lambda: session.configure(variant, parameters))
+            self._in_worker('configure', lambda: session.configure(variant, parameters))
 
-    def _in_worker(self, function: Callable[[], None]) -> None:
+    def _in_worker(self, kind: str, function: Callable[[], None]) -> None:
         if self._worker is not None:
-            self._worker.call(function)
+            self._worker.call(kind, function)
         else:
             function()
 
@@ -281,6 +306,10 @@ class TrackerNode(LifecycleNode):
 
     def _worker_failed(self, error: Exception) -> None:
         self._fault('internal_errors', f'internal error: {type(error).__name__}: {error}')
+
+    def _cannot(self, text: str) -> None:
+        self.statistics.error('failed_transitions', text)
+        self.get_logger().error(text)
 
     def _fault(self, kind: str, text: str) -> None:
         """Count a fault and say it, each kind every few seconds at most."""
@@ -298,7 +327,7 @@ class TrackerNode(LifecycleNode):
 
     def _state(self) -> NodeState:
         name = self.get_fully_qualified_name()
-        lifecycle = self._state_machine.current_state[1]
+        lifecycle = self._lifecycle()
         session, wired = self._session, self._inputs
         if session is None:
             return NodeState(name, lifecycle)
@@ -318,4 +347,5 @@ class TrackerNode(LifecycleNode):
             depth_publishers=publishers[DEPTH],
             stale_after=self._settings.stale_after,
             uses_depth=VARIANTS[session.variant].uses_depth,
+            depth_fault=self._intake.fit.fault if self._intake is not None else '',
         )

@@ -44,25 +44,27 @@ def segment_size(free: int) -> int:
 
 
 def ensure_image_transport() -> None:
-    """Use the package's Fast DDS profile, unless the user names one or another middleware.
-
-    The profile's segment is made smaller where shared memory is small, as in containers.
-    """
+    """Use the package's Fast DDS profile, unless the user names one or another middleware."""
     if os.environ.get(PROFILE_VARIABLE):
         return
     if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
         return
+    profile = fitting_profile()
+    if profile is not None:
+        os.environ[PROFILE_VARIABLE] = str(profile)
+
+
+def fitting_profile() -> Path | None:
+    """The package's profile, its segment made smaller where shared memory is small (containers)."""
     profile = profile_path()
     if profile is None:
-        return
+        return None
     try:
         space = os.statvfs(SHM)
         size = segment_size(space.f_bavail * space.f_frsize)
     except OSError:
         size = _SMALLEST
-    if size < _LARGEST:
-        profile = _resized(profile, size)
-    os.environ[PROFILE_VARIABLE] = str(profile)
+    return profile if size == _LARGEST else _resized(profile, size)
 
 
 def _resized(profile: Path, size: int) -> Path:

@@ -1,0 +1,167 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Start and end of the executables: what they are told, and when they are told to stop."""
+
+from __future__ import annotations
+
+import ast
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+
+from rgbd_kcf_tracker.ros import replay_main, replay_node, tracker_main, tracker_node
+from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE
+
+pytestmark = pytest.mark.ros
+
+MAINS = {'tracker': tracker_main.main, 'replay': replay_main.main}
+
+
+@pytest.fixture
+def _process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What a main program changes in its process, put back."""
+    monkeypatch.setenv(PROFILE_VARIABLE, '')
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures('_process')
+@pytest.mark.parametrize('program', MAINS)
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        ('--ros-args --params-file /nowhere.yaml', 'Error opening YAML file'),
+        ('--ros-args -r __node:=bad/name', "Couldn't parse remap rule"),
+        ('--ros-args -r __ns:=bad', "Couldn't parse remap rule"),
+        ('--ros-args -r nothing', "Couldn't parse remap rule"),
+        ('--ros-args -p bag:=', "Couldn't parse parameter override rule"),
+        ('--ros-args --log-level loud', "Couldn't parse log level"),
+        ('--ros-args --magic', "['--magic']"),
+        ('walk.mcap', "unknown argument 'walk.mcap'"),
+        ('--ros-args -p use_sim_time:=5', 'use_sim_time must be true or false'),
+        ('--ros-args -p speed:=1.0 -p zzz:=1', "unknown parameter 'speed'"),
+    ],
+)
+def test_what_cannot_be_understood_is_refused(
+    program: str, arguments: str, words: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert MAINS[program](arguments.split()) == 2
+    said = capfd.readouterr().err
+    (line,) = [line for line in said.splitlines() if line.startswith(f'{program}: ')]
+    assert words in line
+    assert 'Traceback' not in said
+    assert '/src/' not in line
+
+
+@pytest.mark.usefixtures('_process')
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        ('variatn:=kcf', "unknown parameter 'variatn': did you mean 'variant'?"),
+        ('kcf.padding_:=1.0', "did you mean 'kcf.padding'?"),
+        ('kcf.learning_rate:=7.5', 'learning_rate is 7.5: it must be between 0 and 1'),
+        ('pair_tolerance:="soon"', 'pair_tolerance'),
+        ('variant:=3', 'variant'),
+        ('init_box:="1,2,3"', 'give x,y,width,height'),
+        (
+            'qos_overrides./color/image.subscription.reliability:=magic',
+            'Unexpected QoS override',
+        ),
+    ],
+)
+def test_a_tracker_refuses_wrong_parameters(
+    arguments: str, words: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
+    assert words in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures('_process')
+def test_all_that_is_wrong_is_said_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+    wrong = ['-p', 'variatn:=kcf', '-p', 'qos_depth:=0', '-p', 'autostart:=7']
+    assert tracker_main.main(['--ros-args', *wrong]) == 2
+    line = capfd.readouterr().err.splitlines()[-1]
+    assert all(name in line for name in ('variatn', 'qos_depth', 'autostart'))
+
+
+@pytest.mark.usefixtures('_process')
+@pytest.mark.parametrize('program', MAINS)
+@pytest.mark.parametrize(
+    'arguments', ['--help', '-h', '--ros-args -h', '--ros-args -p x:=1 --help']
+)
+def test_help_starts_nothing(
+    program: str,
+    arguments: str,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rclpy, 'init', pytest.fail)
+    assert MAINS[program](arguments.split()) == 0
+    said = capfd.readouterr()
+    assert said.out.startswith(f'usage: {program}')
+    assert said.err == ''
+
+
+def stop_after(seconds: float, wait: Callable[[subprocess.Popen[str]], None]) -> tuple[int, str]:
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'rgbd_kcf_tracker.ros.tracker_main'],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    wait(process)
+    time.sleep(seconds)
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    return process.returncode, output
+
+
+def maps(pid: int) -> str:
+    return Path(f'/proc/{pid}/maps').read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('library', ['multiarray', 'cv2', '_rclpy_pybind11', 'librmw_fastrtps_cpp'])
+def test_interrupted_while_it_starts_it_ends_without_a_word(library: str) -> None:
+    """At the moments when it has just loaded one library or another."""
+
+    def loaded(process: subprocess.Popen[str]) -> None:
+        end = time.monotonic() + 60
+        while library not in maps(process.pid):
+            assert process.poll() is None
+            assert time.monotonic() < end
+            time.sleep(0.002)
+
+    status, output = stop_after(0.0, loaded)
+    assert status == 0, output
+    assert 'Traceback' not in output
+
+
+def test_nodes_use_only_what_rclpy_makes_public() -> None:
+    """A private member that another release names otherwise would stop the node."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
+    bare = LifecycleNode('bare', context=context)
+    theirs = {name for name in dir(bare) if name.startswith('_') and not name.startswith('__')}
+    bare.destroy_node()
+    rclpy.shutdown(context=context)
+    for module in (tracker_node, replay_node):
+        tree = ast.parse(Path(module.__file__).read_text(encoding='utf-8'))
+        used = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        assert not used & theirs
+        assert not any(
+            isinstance(node, ast.Constant) and node.value in theirs for node in ast.walk(tree)
+        )
