@@ -14,7 +14,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,15 @@ class Network:
             text=True,
         )
 
+    def plug(self, host: str, plugged: bool) -> None:
+        """Pull a host's cable out of the switch, or put it in."""
+        port = f'port{HOSTS.index(host)}'
+        ip('-n', self.hub, 'link', 'set', port, 'up' if plugged else 'down')
+
+    def disturb(self, host: str, *netem: str) -> None:
+        """Loss and delay on all that a host sends."""
+        tc('-n', self.name(host), 'qdisc', 'add', 'dev', 'eth0', 'root', 'netem', *netem)
+
     def sent_bytes(self, host: str) -> int:
         text = ip('-n', self.name(host), '-s', '-j', 'link', 'show', 'eth0')
         return int(json.loads(text)[0]['stats64']['tx']['bytes'])
@@ -97,6 +107,10 @@ class Network:
 def ip(*arguments: str) -> str:
     done = subprocess.run(['ip', *arguments], check=True, capture_output=True, text=True)
     return done.stdout
+
+
+def tc(*arguments: str) -> None:
+    subprocess.run(['tc', *arguments], check=True, capture_output=True, text=True)
 
 
 @pytest.fixture
@@ -166,3 +180,74 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
     assert sent / count < (0.5 if compressed else 1.3) * raw
     if not compressed:
         assert sent / count > 0.9 * raw
+
+
+COMPRESSED = (
+    *('-p', 'color_transport:=compressed'),
+    *('-p', 'depth_transport:=compressedDepth'),
+)
+
+
+def run_disturbed(network: Network, count: int, disturb: Callable[[], None]) -> dict[str, Any]:
+    """Compressed images at 15 Hz over three hosts, and what befalls the network meanwhile."""
+    processes = []
+    try:
+        consumer = network.start(
+            'consumer',
+            'rgbd_kcf_tracker.bench.listener',
+            *('--timeout', '90', '--silence', '6'),
+        )
+        tracker = network.start(
+            'tracker',
+            'rgbd_kcf_tracker.ros.tracker_main',
+            *('--ros-args', '-r', f'__ns:={NAMESPACE}', *COMPRESSED),
+            *('-p', f'init_box:={first_box("sd")}'),
+        )
+        processes = [consumer, tracker]
+        assert consumer.stdout.readline() == 'listening\n'
+        camera = network.start(
+            'camera',
+            'rgbd_kcf_tracker.bench.camera',
+            *('--size', 'sd', '--count', str(count), '--rate', '15', '--compressed'),
+        )
+        processes.append(camera)
+        disturb()
+        assert camera.wait(90) == 0, 'the camera found nobody who listens'
+        figures: dict[str, Any] = json.loads(consumer.communicate(timeout=90)[0].splitlines()[-1])
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            assert process.wait(20) in (0, 1)
+            process.stdout.close()
+    print(f'\n{figures}')
+    return figures
+
+
+def test_links_that_go_down_come_back(network: Network) -> None:
+    """Nothing need be started again: images and answers go on where they can."""
+    count = 150
+
+    def disturb() -> None:
+        for host in ('camera', 'consumer'):
+            time.sleep(3)
+            network.plug(host, False)
+            time.sleep(2)
+            network.plug(host, True)
+
+    figures = run_disturbed(network, count, disturb)
+    assert figures['longest_gap_s'] > 1.5
+    assert figures['after_gap'] > 10
+    assert figures['boxes'] >= 0.8 * figures['answers']
+
+
+def test_loss_and_delay(network: Network) -> None:
+    """As over Wi-Fi: what is lost is lost, and everything else is answered."""
+    try:
+        for host in HOSTS:
+            network.disturb(host, 'delay', '15ms', '5ms', 'loss', '1%')
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f'no netem in this kernel: {getattr(error, "stderr", error)}')
+    figures = run_disturbed(network, 90, lambda: None)
+    assert figures['answers'] > 20
+    assert figures['longest_gap_s'] < 5

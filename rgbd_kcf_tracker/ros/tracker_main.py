@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from rclpy.executors import Executor
 
 SWITCH_INTERVAL_S = 0.0005
-"""Seconds. The executor's thread and the worker's wait for each other's hold on the interpreter:
-with Python's default, ten times as long (docs/live.md)."""
+"""Seconds that one of the executor's and the worker's threads holds the interpreter while the other
+waits for it: a tenth of Python's default (docs/live.md)."""
 
 
 def main(arguments: list[str] | None = None) -> int:
