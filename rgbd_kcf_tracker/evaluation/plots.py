@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
+from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
@@ -20,21 +18,10 @@ from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.perframe import Result
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
-PALETTE = (
-    '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00',
-    '#56B4E9', '#7F3C8D', '#444444', '#A5AA99',
-)  # fmt: skip
 ERROR_CAP_PX = 150.0
 """Centre errors are drawn up to here, as in the thesis's Figure 3.3."""
 
-_DPI = 110
 _ABSENT, _PARTLY = '#c9ccd1', '#eceef1'
-
-
-def colors(trackers: Sequence[str]) -> dict[str, str]:
-    """One colour per tracker, the same in every plot."""
-    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(trackers)}
 
 
 def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
@@ -53,13 +40,13 @@ def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
 
 def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -> bytes:
     """Success over IoU, precision over pixels, and Princeton's R over its thresholds."""
-    figure = _figure(12.5, 4.2)
+    figure = plot_style.figure(12.5, 4.2)
     panels = (
         ('success', otb.OVERLAP_THRESHOLDS, 'IoU threshold', 'OTB success plot'),
         ('precision', otb.PIXEL_THRESHOLDS, 'centre error threshold (px)', 'OTB precision plot'),
         ('princeton', princeton.THRESHOLDS, 'overlap threshold', "Princeton's R"),
     )
-    palette = colors(measured.trackers)
+    palette = plot_style.colors(measured.trackers)
     for index, (key, xs, label, title) in enumerate(panels):
         axes = figure.add_subplot(1, 3, index + 1)
         for tracker in measured.trackers:
@@ -69,16 +56,16 @@ def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -
         axes.set(xlabel=label, title=title, ylim=(0, 1.02), xlim=(xs[0], xs[-1]))
         if index == 0:
             axes.set_ylabel('share of frames')
-        _tidy(axes)
+        plot_style.tidy(axes)
         legend_title = 'at 20 px' if key == 'precision' else 'area under curve'
         axes.legend(fontsize=7.5, title=legend_title, title_fontsize=7.5, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def scenario_plot(measured: Measured, main: str) -> bytes:
     """Success by scenario: one row per scenario, one dot per tracker, sorted by the main one."""
-    palette = colors(measured.trackers)
-    figure = _figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
+    palette = plot_style.colors(measured.trackers)
+    figure = plot_style.figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
     axes = figure.add_subplot()
     means = {
         (t, s): 100 * measured.mean(t, s).success
@@ -94,19 +81,19 @@ def scenario_plot(measured: Measured, main: str) -> bytes:
             axes.scatter(value, y, s=34, color=palette[tracker], zorder=2, label=label)
     axes.set_yticks(range(len(order)), order)
     axes.set(xlim=(-1, 101), xlabel='success % (Princeton, 0.5)', ylim=(-0.7, len(order) - 0.3))
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(
         fontsize=8, frameon=False, loc='lower center', bbox_to_anchor=(0.5, 1.0),
         ncols=min(5, len(measured.trackers)),
     )  # fmt: skip
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
     """Precision over recall while the score's threshold falls."""
-    figure = _figure(5.2, 4.2)
+    figure = plot_style.figure(5.2, 4.2)
     axes = figure.add_subplot()
-    palette = colors(list(curves))
+    palette = plot_style.colors(list(curves))
     for tracker, c in curves.items():
         label = f'{tracker} [F {c.f_score:.3f}]'
         axes.plot(c.recalls, c.precisions, color=palette[tracker], lw=1.8, label=label)
@@ -115,9 +102,9 @@ def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
         xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.02),
         title='Long-term precision and recall',
     )  # fmt: skip
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
@@ -125,8 +112,8 @@ def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
     count = len(tables)
     columns = min(4, count)
     rows = -(-count // columns)
-    figure = _figure(3.1 * columns + 0.4, 3.2 * rows)
-    palette = colors(list(tables))
+    figure = plot_style.figure(3.1 * columns + 0.4, 3.2 * rows)
+    palette = plot_style.colors(list(tables))
     for index, (tracker, table) in enumerate(tables.items()):
         axes = figure.add_subplot(rows, columns, index + 1)
         centers = (table.edges[:-1] + table.edges[1:]) / 2
@@ -140,20 +127,20 @@ def reliability_plot(tables: Mapping[str, Reliability]) -> bytes:
         )  # fmt: skip
         axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel='score')
         axes.set_title(f'{tracker}\nerror {table.expected_error:.3f}', fontsize=9)
-        _tidy(axes)
+        plot_style.tidy(axes)
         if index == 0:
             axes.legend(fontsize=7, frameon=False, loc='upper left')
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def expected_overlap_plot(
     runs: Mapping[tuple[str, str], vot.ShortTermRun], lengths: tuple[int, int] | None = None
 ) -> bytes:
     """VOT's expected average overlap over sequence length, the averaged lengths shaded."""
-    figure = _figure(5.2, 3.6)
+    figure = plot_style.figure(5.2, 3.6)
     axes = figure.add_subplot()
     trackers = list(dict.fromkeys(t for t, _ in runs))
-    palette = colors(trackers)
+    palette = plot_style.colors(trackers)
     for tracker in trackers:
         own = [run for (t, _), run in runs.items() if t == tracker]
         longest = max(len(r.codes) for r in own)
@@ -166,16 +153,16 @@ def expected_overlap_plot(
         xlabel='sequence length (frames)', ylabel='expected average overlap', ylim=(0, 1.02),
         title='VOT: expected average overlap',
     )  # fmt: skip
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> bytes:
     """Centre error and IoU over time, frames without the target shaded."""
     first = results[0]
     seconds = (np.array(first.stamps_ns, np.float64) - first.stamps_ns[0]) / 1e9
-    figure = _figure(9.5, 3.4)
+    figure = plot_style.figure(9.5, 3.4)
     error_axes = figure.add_subplot(2, 1, 1)
     iou_axes = figure.add_subplot(2, 1, 2, sharex=error_axes)
     absent = ~first.frames.there
@@ -183,7 +170,7 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
     for axes in (error_axes, iou_axes):
         _shade(axes, seconds, absent, _ABSENT)
         _shade(axes, seconds, partly, _PARTLY)
-        _tidy(axes)
+        plot_style.tidy(axes)
     for row, r in enumerate(results):
         c, color = r.frames, palette[r.tracker]
         error_axes.plot(
@@ -206,7 +193,7 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
         ylabel='IoU', xlabel='time (s)', ylim=(-0.07 * (len(results) + 1), 1.03),
         xlim=(seconds[0], max(seconds[-1], seconds[0] + 1e-3)), yticks=(0, 0.5, 1),
     )  # fmt: skip
-    return _png(figure, 90)
+    return plot_style.png(figure, 90)
 
 
 def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
@@ -221,22 +208,3 @@ def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
 def _mean(curves: Sequence[Array], size: int) -> Array:
     mean: Array = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
     return mean
-
-
-def _figure(width: float, height: float) -> Figure:
-    figure = Figure(figsize=(width, height), layout='constrained')
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _tidy(axes: Axes) -> None:
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.grid(color='#e3e5e8', lw=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8)
-
-
-def _png(figure: Figure, dpi: int = _DPI) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format='png', dpi=dpi)
-    return buffer.getvalue()

@@ -12,7 +12,7 @@ from typing import Any
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation import page, plots, tables, thesis_tables
+from rgbd_kcf_tracker.evaluation import page, plot_style, plots, tables, thesis_tables
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
@@ -89,7 +89,7 @@ def write_report(
     numbers = _numbers(measured, every, curves, contenders, failures, heading)
     write_json(folder / 'report.json', numbers, indent=1)
 
-    palette = plots.colors(measured.trackers)
+    palette = plot_style.colors(measured.trackers)
     main = main_tracker(measured.trackers, contenders, heading.ablated)
     content |= {
         'curves': page.uri(plots.curve_plots(measured, curves)),

@@ -1,0 +1,4 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What people look at: the page in the browser, and the pictures that explain the trackers."""
