@@ -28,7 +28,10 @@ ROS = [
     'ros-lifecycle-msgs==2.0.3',
     'ros-rosgraph-msgs==2.0.3',
 ]
+# The page in the browser.
+VIEW = ['aiohttp>=3.8']
 TEST = [
+    *VIEW,
     'pytest>=8',
     'pytest-timeout',
     'pytest-xdist',
@@ -82,7 +85,7 @@ setup(
         'Typing :: Typed',
     ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css']},
+    package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css', '**/*.js']},
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
@@ -105,7 +108,7 @@ setup(
         'jinja2',
         'imageio-ffmpeg',
     ],
-    extras_require={'ros': ROS, 'test': TEST, 'lint': LINT},
+    extras_require={'ros': ROS, 'view': VIEW, 'test': TEST, 'lint': LINT},
     zip_safe=False,
     entry_points={
         'console_scripts': [

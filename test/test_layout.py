@@ -142,6 +142,7 @@ def test_every_library_is_declared() -> None:
         'tqdm': ('tqdm', 'python3-tqdm'),
         'matplotlib': ('matplotlib', 'python3-matplotlib'),
         'jinja2': ('jinja2', 'python3-jinja2'),
+        'aiohttp': ('aiohttp', 'python3-aiohttp'),
         'imageio_ffmpeg': ('imageio-ffmpeg', 'ffmpeg'),
         'psutil': ('psutil', 'python3-psutil'),
     }

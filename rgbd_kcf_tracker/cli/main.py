@@ -16,7 +16,7 @@ from typing import Protocol, cast
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
 PROGRAM = 'rgbd-kcf'
-SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'explain', 'bench')
+SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'view', 'explain', 'bench')
 
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130

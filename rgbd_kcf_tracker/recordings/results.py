@@ -42,12 +42,7 @@ class TrackCsvWriter:
         Raises:
             RecordingError: where it cannot be written.
         """
-        cells = [str(number), str(stamp_ns), '', '', '', '', track.state.value, '', '']
-        if track.box is not None:
-            cells[2:6] = (f'{value:.4f}' for value in track.box.as_tuple())
-            cells[7] = '' if math.isnan(track.score) else f'{track.score:.4f}'
-            cells[8] = '' if track.depth is None else f'{track.depth:.4f}'
-        self._write(','.join(cells))
+        self._write(','.join(track_cells(number, stamp_ns, track)))
 
     def close(self) -> None:
         """Close the file."""
@@ -73,6 +68,16 @@ class TrackCsvWriter:
             raise
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
+
+
+def track_cells(number: int, stamp_ns: int, track: Track) -> list[str]:
+    """The cells of a row, one for each word of :data:`HEADER`."""
+    cells = [str(number), str(stamp_ns), '', '', '', '', track.state.value, '', '']
+    if track.box is not None:
+        cells[2:6] = (f'{value:.4f}' for value in track.box.as_tuple())
+        cells[7] = '' if math.isnan(track.score) else f'{track.score:.4f}'
+        cells[8] = '' if track.depth is None else f'{track.depth:.4f}'
+    return cells
 
 
 def open_for_writing(path: Path) -> TextIO:
