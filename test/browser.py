@@ -80,14 +80,13 @@ class Page:
             raise RuntimeError(f'{script}: {result["exceptionDetails"]}')
         return result['result'].get('value')
 
-    def until(self, script: str, seconds: float = 30) -> Any:
+    def until(self, script: str, seconds: float = 30) -> None:
         """Wait until an expression gives something true."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             with contextlib.suppress(RuntimeError):
-                value = self.value(script)
-                if value:
-                    return value
+                if self.value(f'Boolean({script})'):
+                    return
             time.sleep(0.05)
         words = self.value('document.body && document.body.innerText')
         raise AssertionError(f'{script} stayed false; the page says: {words}; errors {self.errors}')

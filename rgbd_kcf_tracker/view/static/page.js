@@ -375,7 +375,7 @@ function replay() {
   const put = async index => {
     run.index = Math.max(0, Math.min(index, unpacked.length - 1));
     const past = heads.slice(0, run.index).flatMap(h => h.entries);
-    page.entries = past;
+    page.entries = [...past];
     if (run.index === 0 || run.jump) page.trails.clear();
     await show(unpacked[run.index]);
     page.entries = [...past, ...heads[run.index].entries].filter(e => e.t >= heads[run.index].time - 60);
