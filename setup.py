@@ -115,6 +115,7 @@ setup(
             'rgbd-kcf = rgbd_kcf_tracker.cli.main:main',
             'tracker = rgbd_kcf_tracker.ros.tracker_main:main',
             'replay = rgbd_kcf_tracker.ros.replay_main:main',
+            'viewer = rgbd_kcf_tracker.ros.viewer_main:main',
         ],
     },
 )

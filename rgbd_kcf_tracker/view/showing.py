@@ -250,4 +250,5 @@ def room_points(frame: Frame, k: Intrinsics, most: int) -> bytes:
     places = np.stack(((u - k.cx) * depth / k.fx, (v - k.cy) * depth / k.fy, depth), axis=1)
     millimetres = np.clip(places * 1000, -32000, 32000).astype('<i2')
     colors = frame.color[v, u, ::-1]
-    return millimetres.tobytes() + np.ascontiguousarray(colors).tobytes()
+    packed: bytes = millimetres.tobytes() + np.ascontiguousarray(colors).tobytes()
+    return packed
