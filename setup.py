@@ -40,6 +40,8 @@ TEST = [
     'colcon-common-extensions',
     'setuptools>=70.1,<80',  # builds wheels by itself; colcon refuses later ones
 ]
+# The site of docs/.
+DOCS = ['sphinx>=7', 'myst-parser>=3', 'furo']
 LINT = [
     'ruff==0.17.5',
     'mypy==2.4.1',
@@ -108,7 +110,7 @@ setup(
         'jinja2',
         'imageio-ffmpeg',
     ],
-    extras_require={'ros': ROS, 'view': VIEW, 'test': TEST, 'lint': LINT},
+    extras_require={'ros': ROS, 'view': VIEW, 'test': TEST, 'lint': LINT, 'docs': DOCS},
     zip_safe=False,
     entry_points={
         'console_scripts': [

@@ -37,6 +37,7 @@ SIDEWAYS = {
     ('simulation', 'recordings'),
     ('bench', 'ros'),
     ('cli', 'view'),
+    ('bench', 'view'),
     ('ros', 'view'),  # the viewer node, which is the page over a running tracker
 }
 # Within metric/, what stands in none of the folders being the last.

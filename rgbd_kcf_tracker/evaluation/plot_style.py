@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -31,6 +32,24 @@ DPI = 110
 def colors(names: Sequence[str]) -> dict[str, str]:
     """One colour per name, the same in every plot."""
     return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(names)}
+
+
+# Solid first; each further line also by its dashes, so that a print in grey tells them apart.
+_DASHES = ('-', '--', '-.', ':', (0, (6, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 3)), (0, (3, 3)))
+_MARKERS = 'osD^vPX*'
+
+
+def strokes(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """How to draw the line of each name: colour and dashes, as keywords of ``plot``."""
+    return {
+        name: {'color': PALETTE[i % len(PALETTE)], 'ls': _DASHES[i % len(_DASHES)]}
+        for i, name in enumerate(names)
+    }
+
+
+def markers(names: Sequence[str]) -> dict[str, str]:
+    """The marker of each name, for dots without a line."""
+    return {name: _MARKERS[i % len(_MARKERS)] for i, name in enumerate(names)}
 
 
 def figure(width: float, height: float) -> Figure:

@@ -46,13 +46,13 @@ def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -
         ('precision', otb.PIXEL_THRESHOLDS, 'centre error threshold (px)', 'OTB precision plot'),
         ('princeton', princeton.THRESHOLDS, 'overlap threshold', "Princeton's R"),
     )
-    palette = plot_style.colors(measured.trackers)
+    strokes = plot_style.strokes(measured.trackers)
     for index, (key, xs, label, title) in enumerate(panels):
         axes = figure.add_subplot(1, 3, index + 1)
         for tracker in measured.trackers:
             ys = curves[tracker][key]
             value = ys[otb.PRECISION_BIN] if key == 'precision' else np.mean(ys)
-            axes.plot(xs, ys, color=palette[tracker], lw=1.8, label=f'{tracker} [{value:.3f}]')
+            axes.plot(xs, ys, **strokes[tracker], lw=1.8, label=f'{tracker} [{value:.3f}]')
         axes.set(xlabel=label, title=title, ylim=(0, 1.02), xlim=(xs[0], xs[-1]))
         if index == 0:
             axes.set_ylabel('share of frames')
@@ -65,6 +65,7 @@ def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -
 def scenario_plot(measured: Measured, main: str) -> bytes:
     """Success by scenario: one row per scenario, one dot per tracker, sorted by the main one."""
     palette = plot_style.colors(measured.trackers)
+    markers = plot_style.markers(measured.trackers)
     figure = plot_style.figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
     axes = figure.add_subplot()
     means = {
@@ -78,7 +79,10 @@ def scenario_plot(measured: Measured, main: str) -> bytes:
         axes.plot([min(values), max(values)], [y, y], color='#d5d8dc', lw=3, zorder=1)
         for tracker, value in zip(measured.trackers, values, strict=True):
             label = tracker if y == 0 else None
-            axes.scatter(value, y, s=34, color=palette[tracker], zorder=2, label=label)
+            axes.scatter(
+                value, y, s=34, color=palette[tracker], marker=markers[tracker], zorder=2,
+                label=label,
+            )  # fmt: skip
     axes.set_yticks(range(len(order)), order)
     axes.set(xlim=(-1, 101), xlabel='success % (Princeton, 0.5)', ylim=(-0.7, len(order) - 0.3))
     plot_style.tidy(axes)
@@ -93,10 +97,10 @@ def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
     """Precision over recall while the score's threshold falls."""
     figure = plot_style.figure(5.2, 4.2)
     axes = figure.add_subplot()
-    palette = plot_style.colors(list(curves))
+    strokes, palette = plot_style.strokes(list(curves)), plot_style.colors(list(curves))
     for tracker, c in curves.items():
         label = f'{tracker} [F {c.f_score:.3f}]'
-        axes.plot(c.recalls, c.precisions, color=palette[tracker], lw=1.8, label=label)
+        axes.plot(c.recalls, c.precisions, **strokes[tracker], lw=1.8, label=label)
         axes.plot(c.recall, c.precision, 'o', color=palette[tracker], ms=6)
     axes.set(
         xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.02),
@@ -140,12 +144,12 @@ def expected_overlap_plot(
     figure = plot_style.figure(5.2, 3.6)
     axes = figure.add_subplot()
     trackers = list(dict.fromkeys(t for t, _ in runs))
-    palette = plot_style.colors(trackers)
+    strokes = plot_style.strokes(trackers)
     for tracker in trackers:
         own = [run for (t, _), run in runs.items() if t == tracker]
         longest = max(len(r.codes) for r in own)
         curve = vot.expected_overlap_curve(own, longest)
-        axes.plot(np.arange(1, longest + 1), curve, color=palette[tracker], lw=1.8, label=tracker)
+        axes.plot(np.arange(1, longest + 1), curve, **strokes[tracker], lw=1.8, label=tracker)
         low, high = lengths or vot.typical_lengths([len(r.codes) for r in own])
         if tracker == trackers[0]:
             axes.axvspan(low, max(high, low + 1), color=_PARTLY, zorder=0)
@@ -171,13 +175,14 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
         _shade(axes, seconds, absent, _ABSENT)
         _shade(axes, seconds, partly, _PARTLY)
         plot_style.tidy(axes)
+    strokes = plot_style.strokes(list(palette))
     for row, r in enumerate(results):
-        c, color = r.frames, palette[r.tracker]
+        c, color, stroke = r.frames, palette[r.tracker], strokes[r.tracker]
         error_axes.plot(
-            seconds, np.minimum(c.error, ERROR_CAP_PX), color=color, lw=1.2, label=r.tracker
+            seconds, np.minimum(c.error, ERROR_CAP_PX), **stroke, lw=1.2, label=r.tracker
         )
         shown = np.where(c.there, np.nan_to_num(c.overlap), np.nan)
-        iou_axes.plot(seconds, shown, color=color, lw=1.2)
+        iou_axes.plot(seconds, shown, **stroke, lw=1.2)
         false = c.said & ~c.there
         iou_axes.plot(
             seconds[false], np.full(false.sum(), -0.07 - 0.07 * row), '|', color=color, ms=4, mew=1

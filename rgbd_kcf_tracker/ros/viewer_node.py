@@ -10,7 +10,6 @@ in another process than the tracker, which neither waits for it nor knows of it.
 from __future__ import annotations
 
 import queue
-from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -27,8 +26,8 @@ from std_srvs.srv import Trigger
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
-from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.live.settings import RAW
+from rgbd_kcf_tracker.parameters import ParameterInfo, describe
 from rgbd_kcf_tracker.recordings.images import (
     decode_color,
     decode_compressed_color,
@@ -39,7 +38,7 @@ from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_fr
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
-from rgbd_kcf_tracker.view.live_page import LivePage, node_parameter
+from rgbd_kcf_tracker.view.live_page import LivePage, ViewerParameters, node_parameter
 
 POLL_S = 0.05
 SETTINGS_S = 2.0
@@ -48,32 +47,6 @@ LINGER_S = 3.0
 PAIR_NS = 20_000_000
 HELD = 6
 """Images that are kept for their partner."""
-
-
-@dataclass(frozen=True)
-class ViewerParameters(Parameters):
-    """Parameters of the viewer node."""
-
-    tracker: str = parameter('tracker', 'Name of the tracker node, with its namespace.')
-    host: str = parameter(
-        '127.0.0.1', 'Address to listen on; any but a loopback address needs a token.'
-    )
-    port: int = parameter(8080, 'TCP port of the page.', minimum=0, maximum=65535)
-    token: str = parameter(
-        '', 'Asked for before anything is shown; better in the environment variable RGBD_KCF_TOKEN.'
-    )
-    rate: float = parameter(
-        10.0, 'Moments shown each second, at most.', unit='Hz', minimum=0.2, maximum=60.0
-    )
-    color_transport: str = parameter(
-        RAW, 'How colour images arrive.', choices=(RAW, COMPRESSED), source='image_transport'
-    )
-    depth_transport: str = parameter(
-        RAW,
-        'How depth images arrive.',
-        choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
-        source='image_transport',
-    )
 
 
 class ViewerNode(Node):

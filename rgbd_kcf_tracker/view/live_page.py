@@ -10,11 +10,14 @@ import queue
 import time
 from collections import OrderedDict, deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
+from rgbd_kcf_tracker.parameters import Parameters, parameter
 from rgbd_kcf_tracker.recordings.results import track_cells
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, default_parameters
@@ -28,6 +31,32 @@ TARGET = 1
 _ANSWERS = 64
 _MOST_ROWS = 200_000
 _MOST_COMMANDS = 64
+
+
+@dataclass(frozen=True)
+class ViewerParameters(Parameters):
+    """Parameters of the viewer node."""
+
+    tracker: str = parameter('tracker', 'Name of the tracker node, with its namespace.')
+    host: str = parameter(
+        '127.0.0.1', 'Address to listen on; any but a loopback address needs a token.'
+    )
+    port: int = parameter(8080, 'TCP port of the page.', minimum=0, maximum=65535)
+    token: str = parameter(
+        '', 'Asked for before anything is shown; better in the environment variable RGBD_KCF_TOKEN.'
+    )
+    rate: float = parameter(
+        10.0, 'Moments shown each second, at most.', unit='Hz', minimum=0.2, maximum=60.0
+    )
+    color_transport: str = parameter(
+        RAW, 'How colour images arrive.', choices=(RAW, COMPRESSED), source='image_transport'
+    )
+    depth_transport: str = parameter(
+        RAW,
+        'How depth images arrive.',
+        choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
+        source='image_transport',
+    )
 
 
 class LivePage:
