@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.simulation import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = 'rgbd_kcf_tracker'
-EXECUTABLES = ('rgbd-kcf', 'replay', 'tracker')
+EXECUTABLES = ('rgbd-kcf', 'replay', 'viewer', 'tracker')
 
 
 def clean_environment() -> dict[str, str]:

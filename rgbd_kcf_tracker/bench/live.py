@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import socket
 import sys
 import time
 from contextlib import ExitStack
@@ -26,6 +27,8 @@ from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 WARM_UP = 30
 """Pairs at the start that count as processed but not for latency: caches, pages, discovery."""
+SETTLE_S = 4.0
+"""Seconds in which a viewer and its browsers find each other."""
 EDGES_MS = (0, 2, 4, 6, 8, 10, 12, 15, 20, 25, 33, 50, 100, 200)
 
 
@@ -58,8 +61,10 @@ class Result:
     histogram: tuple[int, ...]
 
 
-def measure(variant: str, size: str, rate: float, seconds: float, with_profile: bool) -> Result:
-    """Run one case.
+def measure(
+    variant: str, size: str, rate: float, seconds: float, with_profile: bool, browsers: int = 0
+) -> Result:
+    """Run one case, with a viewer beside it where browsers are to look.
 
     Raises:
         RuntimeError: where the tracker answers nothing.
@@ -79,6 +84,8 @@ def measure(variant: str, size: str, rate: float, seconds: float, with_profile: 
                 child('rgbd_kcf_tracker.ros.tracker_main', *tracker_arguments, env=env)
             )
             listener.await_tracker(tracker)
+            if browsers:
+                _look(children, namespace, browsers, env)
             camera = children.enter_context(
                 child('rgbd_kcf_tracker.bench.camera', *camera_arguments, env=env)
             )
@@ -117,6 +124,22 @@ def measure(variant: str, size: str, rate: float, seconds: float, with_profile: 
         cpu_cores=(end[1] - begin[1]) / max(end[0] - begin[0], 1e-9),
         histogram=tuple(int(n) for n in bins),
     )
+
+
+def _look(
+    children: ExitStack, namespace: tuple[str, ...], browsers: int, env: dict[str, str]
+) -> None:
+    """Start a viewer and those who look at its page."""
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    viewer = (*namespace, '-p', f'port:={port}')
+    children.enter_context(child('rgbd_kcf_tracker.ros.viewer_main', *viewer, env=env))
+    for _ in range(browsers):
+        children.enter_context(
+            child('rgbd_kcf_tracker.bench.looker', f'http://127.0.0.1:{port}/', env=env)
+        )
+    time.sleep(SETTLE_S)
 
 
 def first_box(size: str) -> str:
@@ -169,6 +192,12 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--sizes', nargs='+', choices=SIZES, default=['sd', 'qhd', 'hd'])
     parser.add_argument('--rate', type=float, default=30.0, help='pairs per second')
     parser.add_argument('--seconds', type=float, default=10.0, help='of each case')
+    parser.add_argument(
+        '--browsers',
+        type=int,
+        default=0,
+        help='that look at a viewer meanwhile (default: no viewer)',
+    )
     parser.add_argument('--no-profile', action='store_true', help="use DDS's default transports")
     parser.add_argument('--output', type=Path, help='JSON file for the figures')
     options = parser.parse_args(args)
@@ -178,7 +207,14 @@ def main(args: list[str] | None = None) -> int:
             print(f'{variant} at {size}, {options.seconds:g} s ...', file=sys.stderr)
             try:
                 results.append(
-                    measure(variant, size, options.rate, options.seconds, not options.no_profile)
+                    measure(
+                        variant,
+                        size,
+                        options.rate,
+                        options.seconds,
+                        not options.no_profile,
+                        options.browsers,
+                    )
                 )
             except RuntimeError as error:
                 print(f'{variant} at {size}: {error}', file=sys.stderr)

@@ -5,17 +5,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 
 from rgbd_kcf_tracker.live.memory import keep_large_blocks
 from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
+GIVE_WAY = 10
+"""Lower priority by so much, as ``nice`` counts."""
 TOKEN_VARIABLE = 'RGBD_KCF_TOKEN'
 
 
 def main(args: list[str] | None = None) -> int:
     """Serve the page until SIGINT or SIGTERM."""
+    # Where there are few cores it gives way to the tracker.
+    with contextlib.suppress(OSError):
+        os.nice(GIVE_WAY)
     keep_large_blocks()  # before NumPy, OpenCV and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings
     try:

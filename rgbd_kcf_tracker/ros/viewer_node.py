@@ -67,8 +67,9 @@ class ViewerNode(Node):
         super().__init__('viewer', **options)
         self.settings = self._declared()
         tracker = self.settings.tracker.rstrip('/')
-        self._tracker = tracker
-        self.page = LivePage(tracker.lstrip('/'), self.settings.rate)
+        # Its full name, as diagnostics and messages to people have it.
+        self._tracker = self.resolve_topic_name(f'{tracker}/box').removesuffix('/box')
+        self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
         light = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
         self.create_subscription(Bool, f'{tracker}/occluded', self._on_occluded, light)
         self.create_subscription(PointStamped, f'{tracker}/position', self._on_position, light)
@@ -115,7 +116,7 @@ class ViewerNode(Node):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            if status.name.split(':')[0].strip().strip('/') == self._tracker.strip('/'):
+            if status.name.partition(':')[0].strip('/ ') == self._tracker.strip('/'):
                 self.page.figures({pair.key: pair.value for pair in status.values})
 
     def _on_info(self, message: CameraInfo) -> None:
