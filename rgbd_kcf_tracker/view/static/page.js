@@ -250,6 +250,7 @@ function greet(hello) {
   $('title').textContent = hello.title;
   $('kind').textContent = stored ? 'a recorded run' : hello.live ? 'live' : 'recording';
   $('transport').hidden = hello.live;
+  if (hello.live) $('no-why').textContent = 'The topics of a running tracker carry no candidates: record a bag and open it with rgbd-kcf view.';
   $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
   $('variant').disabled = Boolean(stored);
   $('legend').textContent = 'score (line), confused with another (dashed); time to read, track and show';
