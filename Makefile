@@ -15,7 +15,7 @@ unexport PYTHONPATH PYTHONHOME LD_LIBRARY_PATH AMENT_PREFIX_PATH COLCON_PREFIX_P
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE VIRTUAL_ENV
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test inject lint types format matrix clean distclean
+.PHONY: help demo test inject lint docs types format matrix clean distclean
 
 help: ## say what can be made
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -33,6 +33,10 @@ lint: $(VENV)/.installed-lint ## check style
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
+docs: $(VENV)/.installed-docs ## make the site of the documentation in site/, strictly
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs site
+	@echo "open site/index.html"
+
 types: $(VENV)/.installed-lint ## check types
 	$(BIN)/mypy
 
@@ -44,7 +48,7 @@ matrix: $(VENV)/.installed-lint ## run the suite on every Python, NumPy and Open
 	$(BIN)/nox
 
 clean: ## remove what was made, but not .venv
-	rm -rf build install log dist demo *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .nox
+	rm -rf build install log dist demo site *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .nox
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 distclean: clean ## remove .venv too
@@ -62,11 +66,15 @@ $(BIN)/python:
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt
 $(VENV)/.installed: setup.py setup.cfg pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing into $(VENV) ..."
-	$(INSTALL) --editable '.[ros,tools]'
+	$(INSTALL) --editable '.[ros,tools,view]'
 	@touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
 	$(INSTALL) --quiet --editable '.[ros,test]'
+	@touch $@
+
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(INSTALL) --quiet --editable '.[ros,docs]'
 	@touch $@
 
 $(VENV)/.installed-lint: $(VENV)/.installed

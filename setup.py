@@ -32,6 +32,7 @@ ROS = [
 # What a robot does without; extras.py tells which command needs which.
 REPORT = ['matplotlib>=3.7', 'jinja2']
 VIDEO = ['imageio-ffmpeg']
+VIEW = ['aiohttp>=3.8']
 TOOLS = [*REPORT, *VIDEO, 'tqdm', 'psutil']
 TEST = [
     'pytest>=8',
@@ -41,6 +42,8 @@ TEST = [
     'colcon-common-extensions',
     'setuptools>=70.1,<80',  # builds wheels by itself; colcon refuses later ones
 ]
+# The site of docs/.
+DOCS = ['sphinx>=7', 'myst-parser>=3', 'furo']
 LINT = [
     'ruff==0.17.5',
     'mypy==2.4.1',
@@ -65,7 +68,12 @@ def shared(folder: str, *patterns: str) -> tuple[str, list[str]]:
 
 # colcon puts the executables there by itself (setup.cfg); pip puts them into bin alone.
 FOR_ROS2_RUN = (
-    [(f'lib/{NAME}', [f'resource/lib/{name}' for name in ('tracker', 'replay', 'rgbd-kcf')])]
+    [
+        (
+            f'lib/{NAME}',
+            [f'resource/lib/{name}' for name in ('tracker', 'replay', 'viewer', 'rgbd-kcf')],
+        )
+    ]
     if 'bdist_wheel' in sys.argv
     else []
 )
@@ -93,7 +101,7 @@ setup(
         'Typing :: Typed',
     ],
     packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css']},
+    package_data={NAME: ['py.typed', '**/*.html', '**/*.j2', '**/*.css', '**/*.js']},
     data_files=[
         *FOR_ROS2_RUN,
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
@@ -116,10 +124,12 @@ setup(
     extras_require={
         'report': REPORT,
         'video': VIDEO,
+        'view': VIEW,
         'tools': TOOLS,
         'ros': ROS,
-        'test': [*TOOLS, *TEST],
+        'test': [*TOOLS, *VIEW, *TEST],
         'lint': LINT,
+        'docs': DOCS,
     },
     zip_safe=False,
     entry_points={
@@ -127,6 +137,7 @@ setup(
             'rgbd-kcf = rgbd_kcf_tracker.cli.main:main',
             'tracker = rgbd_kcf_tracker.ros.tracker_main:main',
             'replay = rgbd_kcf_tracker.ros.replay_main:main',
+            'viewer = rgbd_kcf_tracker.ros.viewer_main:main',
         ],
     },
 )

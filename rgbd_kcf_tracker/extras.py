@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.errors import MissingExtraError
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     'report': (('matplotlib', 'jinja2'), 'python3-matplotlib python3-jinja2'),
     'video': (('imageio_ffmpeg',), 'ffmpeg'),
+    'view': (('aiohttp',), 'python3-aiohttp'),
     'tools': (('tqdm', 'psutil'), 'python3-tqdm python3-psutil'),
 }
 """Extras of the installation: their modules, and Ubuntu's packages with the same."""

@@ -51,6 +51,7 @@ def test_demo_leaves_what_it_promises(tmp_path: Path) -> None:
     for name in ('recording.mcap', 'tracker.mcap', 'boxes.csv', 'tracked.mp4', 'contact_sheet.png'):
         assert (dest / name).stat().st_size > 0
         assert name in done.stdout
+    assert f'rgbd-kcf view {dest / "recording.mcap"} --variant kcf' in done.stdout
 
     with open_recording(dest / 'recording.mcap') as recording:
         stamps = [frame.stamp_ns for frame in recording.frames()]

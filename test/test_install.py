@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.simulation import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = 'rgbd_kcf_tracker'
-EXECUTABLES = ('rgbd-kcf', 'replay', 'tracker')
+EXECUTABLES = ('rgbd-kcf', 'replay', 'viewer', 'tracker')
 NOT_ON_A_ROBOT = (
     *('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'),
     *('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil'),
@@ -168,7 +168,7 @@ def test_rosdep_needs_apt_alone() -> None:
     assert not keys & {'mcap-ros2-support'}
 
 
-def test_the_tracker_node_needs_nothing_that_apt_lacks() -> None:
+def test_the_nodes_of_a_robot_need_nothing_that_apt_lacks() -> None:
     pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
     code = f"""
 import sys
@@ -178,6 +178,7 @@ class Absent:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Absent())
 import rgbd_kcf_tracker.ros.tracker_node, rgbd_kcf_tracker.live.auto_init
+import rgbd_kcf_tracker.ros.viewer_node, rgbd_kcf_tracker.view.server
 from rgbd_kcf_tracker.live.session import warm_up
 from rgbd_kcf_tracker.variants import VARIANTS
 for variant in VARIANTS:

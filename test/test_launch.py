@@ -144,12 +144,28 @@ def test_what_the_shipped_file_documents_is_taken(tmp_path: Path) -> None:
 
 
 def test_arguments_are_declared_with_their_meaning(launch_modules: None) -> None:
-    for file in ('tracker.launch.py', 'replay.launch.py'):
+    for file in ('tracker.launch.py', 'replay.launch.py', 'viewer.launch.py'):
         found = runpy.run_path(str(PROJECT / 'launch' / file))
         (entities,) = found['generate_launch_description']().values
         declared = [e for e in entities if type(e).__name__ == 'DeclareLaunchArgument']
         assert [d.values[0] for d in declared] == list(found['ARGUMENTS'])
         assert all(d.named['description'] for d in declared)
+
+
+def test_the_viewer_looks_at_the_camera_of_the_tracker(launch_modules: None) -> None:
+    from rgbd_kcf_tracker.view.live_page import ViewerParameters
+
+    found = runpy.run_path(str(PROJECT / 'launch' / 'viewer.launch.py'))
+    defaults = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
+    given = {'camera': 'orbbec', 'compressed': 'true', 'port': '9000', 'info_topic': '/my/info'}
+    (node,) = found['start'](defaults | given)
+    tracker, _ = start_tracker(camera='orbbec', compressed='true', info_topic='/my/info')
+    assert node.named['remappings'] == tracker.named['remappings']
+    (parameters,) = node.named['parameters']
+    settings = ViewerParameters(**parameters)
+    assert (settings.port, settings.host, settings.color_transport) == (
+        9000, '127.0.0.1', 'compressed',
+    )  # fmt: skip
 
 
 def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None:

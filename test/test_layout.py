@@ -41,6 +41,8 @@ SIDEWAYS = {
     ('bench', 'ros'),
     ('bench', 'cli'),
     ('cli', 'view'),
+    ('bench', 'view'),
+    ('ros', 'view'),  # the viewer node, which is the page over a running tracker
 }
 # Within metric/, what stands in none of the folders being the last.
 METRIC = ('perceive', 'identity', 'decide')
@@ -147,6 +149,7 @@ def test_every_library_is_declared() -> None:
         'tqdm': ('tqdm', 'python3-tqdm'),
         'matplotlib': ('matplotlib', 'python3-matplotlib'),
         'jinja2': ('jinja2', 'python3-jinja2'),
+        'aiohttp': ('aiohttp', 'python3-aiohttp'),
         'imageio_ffmpeg': ('imageio-ffmpeg', 'ffmpeg'),
         'psutil': ('psutil', 'python3-psutil'),
     }
@@ -215,7 +218,7 @@ def test_extras_are_those_of_the_installation() -> None:
 
 WITHOUT = """
 import sys
-for name in ('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil'):
+for name in ('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil', 'aiohttp'):
     sys.modules[name] = None
 from rgbd_kcf_tracker.cli.main import main
 sys.exit(main(sys.argv[1:]))
@@ -243,6 +246,8 @@ def test_the_commands_of_a_robot_need_no_extra(tmp_path: Path) -> None:
         ('[report]', 'evaluate', 'walk', '--report', 'report'),
         ('[video]', 'track', 'walk', '--video', 'a.mp4'),
         ('[tools]', 'bench', '--soak', '20', '--variants', 'kcf'),
+        ('[view]', 'view', 'walk'),
+        ('[report]', 'explain', 'walk', '--output', 'explained'),
     ):
         done = run(*words)
         assert done.returncode == 2, done.stderr

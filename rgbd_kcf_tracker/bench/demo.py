@@ -103,6 +103,10 @@ def _demo(options: argparse.Namespace) -> None:
         ('contact_sheet.png', 'the run on one page'),
     ):
         print(f'  {dest / name!s:28} {words}')
+    command = Path(sys.executable).with_name('rgbd-kcf')
+    here = Path.cwd()
+    shown = command.relative_to(here) if command.is_relative_to(here) else command
+    print(f'\nSee it in a browser: {shown} view {bag} --variant {options.variant}')
 
 
 def _simulate(options: argparse.Namespace, bag: Path) -> Truth:

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.live.settings import READ_ONLY, NodeParameters
 from rgbd_kcf_tracker.parameters import ParameterInfo, Scalar, describe
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
+from rgbd_kcf_tracker.view.live_page import ViewerParameters
 
 COMMAND = 'python -m rgbd_kcf_tracker.bench.generated'
 _WIDTH = 100
@@ -117,6 +118,12 @@ def parameters_markdown() -> str:
         'All are read when it starts; a value that it cannot use ends it with a message.',
         '',
         *_table('', describe(ReplayParameters)),
+        '',
+        '# Parameters of the viewer node',
+        '',
+        'All are read when it starts; see [the page in the browser](view.md).',
+        '',
+        *_table('', describe(ViewerParameters)),
     ]
     return '\n'.join(lines) + '\n'
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import socket
 import sys
 import time
 from contextlib import ExitStack
@@ -29,6 +30,8 @@ from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 WARM_UP = 30
 """Pairs at the start that count as processed but not for latency: caches, pages, discovery."""
+SETTLE_S = 4.0
+"""Seconds in which a viewer and its browsers find each other."""
 EDGES_MS = (0, 2, 4, 6, 8, 10, 12, 15, 20, 25, 33, 50, 100, 200)
 
 
@@ -82,8 +85,10 @@ class Result:
         return self.tracker.cpu_ms / self.wire.cpu_ms - 1 if self.wire.cpu_ms else math.nan
 
 
-def measure(variant: str, size: str, rate: float, seconds: float, with_profile: bool) -> Result:
-    """Run one case.
+def measure(
+    variant: str, size: str, rate: float, seconds: float, with_profile: bool, browsers: int = 0
+) -> Result:
+    """Run one case, with a viewer beside it where browsers are to look.
 
     Raises:
         RuntimeError: where one of the nodes answers nothing.
@@ -104,6 +109,8 @@ def measure(variant: str, size: str, rate: float, seconds: float, with_profile: 
             )
             wire = children.enter_context(child('rgbd_kcf_tracker.bench.wire', env=env))
             listener.await_tracker(tracker)
+            if browsers:
+                _look(children, namespace, browsers, env)
             camera = children.enter_context(
                 child('rgbd_kcf_tracker.bench.camera', *camera_arguments, env=env)
             )
@@ -153,6 +160,22 @@ def _figures(arrivals: list[tuple[int, int, bool]], cpu_ms: float) -> Figures:
         cpu_ms=cpu_ms,
         histogram=tuple(int(n) for n in np.histogram(latency, (*EDGES_MS, np.inf))[0]),
     )
+
+
+def _look(
+    children: ExitStack, namespace: tuple[str, ...], browsers: int, env: dict[str, str]
+) -> None:
+    """Start a viewer and those who look at its page."""
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    viewer = (*namespace, '-p', f'port:={port}')
+    children.enter_context(child('rgbd_kcf_tracker.ros.viewer_main', *viewer, env=env))
+    for _ in range(browsers):
+        children.enter_context(
+            child('rgbd_kcf_tracker.bench.looker', f'http://127.0.0.1:{port}/', env=env)
+        )
+    time.sleep(SETTLE_S)
 
 
 def first_box(size: str) -> str:
@@ -218,6 +241,12 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--sizes', nargs='+', choices=SIZES, default=['sd', 'qhd', 'hd'])
     parser.add_argument('--rate', type=float, default=30.0, help='pairs per second')
     parser.add_argument('--seconds', type=float, default=10.0, help='of each case')
+    parser.add_argument(
+        '--browsers',
+        type=int,
+        default=0,
+        help='that look at a viewer meanwhile (default: no viewer)',
+    )
     parser.add_argument('--no-profile', action='store_true', help="use DDS's default transports")
     parser.add_argument('--output', type=Path, help='JSON file for the figures')
     options = parser.parse_args(args)
@@ -227,7 +256,14 @@ def main(args: list[str] | None = None) -> int:
             print(f'{variant} at {size}, {options.seconds:g} s ...', file=sys.stderr)
             try:
                 results.append(
-                    measure(variant, size, options.rate, options.seconds, not options.no_profile)
+                    measure(
+                        variant,
+                        size,
+                        options.rate,
+                        options.seconds,
+                        not options.no_profile,
+                        options.browsers,
+                    )
                 )
             except RuntimeError as error:
                 print(f'{variant} at {size}: {error}', file=sys.stderr)

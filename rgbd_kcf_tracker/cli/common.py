@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 if TYPE_CHECKING:
-    from rgbd_kcf_tracker.recordings import ReadOptions
+    from rgbd_kcf_tracker.recordings import ReadOptions, Recording
 
 T = TypeVar('T')
 _MOST_WARNINGS = 20
@@ -68,6 +68,40 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         default=1 << 24,
         help='largest image that is read (default 16777216: 4096x4096)',
     )
+
+
+def add_scene_options(parser: argparse.ArgumentParser, seed: int = 0) -> None:
+    """Declare the options that choose a simulated scene where no recording is named."""
+    group = parser.add_argument_group('simulated scene, where no SOURCE is named')
+    group.add_argument(
+        '--scenario',
+        metavar='NAME',
+        default='occlusion',
+        help='what happens (default: occlusion; rgbd-kcf simulate --list names all)',
+    )
+    group.add_argument(
+        '--seed',
+        metavar='N',
+        type=int,
+        default=seed,
+        help=f'of everything random (default {seed})',
+    )
+
+
+def open_source(args: argparse.Namespace) -> Recording:
+    """The recording that was named, or the simulated scene.
+
+    Raises:
+        RecordingError: where it cannot be opened.
+        ParameterError: for an unknown scene or a value that cannot be.
+    """
+    if args.source is None:
+        from rgbd_kcf_tracker.view.sources import SimulatedRecording
+
+        return SimulatedRecording(args.scenario, args.seed)
+    from rgbd_kcf_tracker.recordings import open_recording
+
+    return open_recording(args.source, read_options(args))
 
 
 def read_options(args: argparse.Namespace) -> ReadOptions:

@@ -147,7 +147,7 @@ def _draw_sheet(
 ) -> None:
     import cv2
 
-    from rgbd_kcf_tracker.recordings.outputs import OutputFile, check_outputs
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs, write_file
     from rgbd_kcf_tracker.simulation import simulate
     from rgbd_kcf_tracker.simulation.contact_sheet import contact_sheet
 
@@ -162,13 +162,7 @@ def _draw_sheet(
     done, data = cv2.imencode(path.suffix, sheet, [int(cv2.IMWRITE_JPEG_QUALITY), 78])
     if not done:
         raise RecordingError(f'{path} cannot be encoded: fewer scenes make a smaller picture')
-    output = OutputFile(path, args.overwrite)
-    try:
-        output.write(data.tobytes())
-    except BaseException:
-        output.end(whole=False, anything=False)
-        raise
-    output.end(whole=True, anything=True)
+    write_file(path, data.tobytes(), args.overwrite)
     print(f'{path}: {len(jobs)} scenes')
 
 

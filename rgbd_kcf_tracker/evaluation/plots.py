@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
+from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
@@ -21,21 +19,10 @@ from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.perframe import Result
 from rgbd_kcf_tracker.evaluation.tables import REAL, SIMULATED, Scored
 
-# Okabe and Ito's colours, which people with any colour vision can tell apart.
-PALETTE = (
-    '#0072B2', '#D55E00', '#009E73', '#CC79A7', '#E69F00',
-    '#56B4E9', '#7F3C8D', '#444444', '#A5AA99',
-)  # fmt: skip
 ERROR_CAP_PX = 150.0
 """Centre errors are drawn up to here, as in the thesis's Figure 3.3."""
 
-_DPI = 110
 _ABSENT, _PARTLY = '#c9ccd1', '#eceef1'
-
-
-def colors(trackers: Sequence[str]) -> dict[str, str]:
-    """One colour per tracker, the same in every plot."""
-    return {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(trackers)}
 
 
 def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
@@ -54,32 +41,33 @@ def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
 
 def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -> bytes:
     """Success over IoU, precision over pixels, and Princeton's R over its thresholds."""
-    figure = _figure(12.5, 4.2)
+    figure = plot_style.figure(12.5, 4.2)
     panels = (
         ('success', otb.OVERLAP_THRESHOLDS, 'IoU threshold', 'OTB success plot'),
         ('precision', otb.PIXEL_THRESHOLDS, 'centre error threshold (px)', 'OTB precision plot'),
         ('princeton', princeton.THRESHOLDS, 'overlap threshold', "Princeton's R"),
     )
-    palette = colors(measured.trackers)
+    strokes = plot_style.strokes(measured.trackers)
     for index, (key, xs, label, title) in enumerate(panels):
         axes = figure.add_subplot(1, 3, index + 1)
         for tracker in measured.trackers:
             ys = curves[tracker][key]
             value = ys[otb.PRECISION_BIN] if key == 'precision' else np.mean(ys)
-            axes.plot(xs, ys, color=palette[tracker], lw=1.8, label=f'{tracker} [{value:.3f}]')
+            axes.plot(xs, ys, **strokes[tracker], lw=1.8, label=f'{tracker} [{value:.3f}]')
         axes.set(xlabel=label, title=title, ylim=(0, 1.02), xlim=(xs[0], xs[-1]))
         if index == 0:
             axes.set_ylabel('share of frames')
-        _tidy(axes)
+        plot_style.tidy(axes)
         legend_title = 'at 20 px' if key == 'precision' else 'area under curve'
         axes.legend(fontsize=7.5, title=legend_title, title_fontsize=7.5, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def scenario_plot(measured: Measured, main: str) -> bytes:
     """Success by scenario: one row per scenario, one dot per tracker, sorted by the main one."""
-    palette = colors(measured.trackers)
-    figure = _figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
+    palette = plot_style.colors(measured.trackers)
+    markers = plot_style.markers(measured.trackers)
+    figure = plot_style.figure(8.5, 0.9 + 0.3 * len(measured.scenarios))
     axes = figure.add_subplot()
     means = {
         (t, s): 100 * measured.mean(t, s).success
@@ -92,38 +80,41 @@ def scenario_plot(measured: Measured, main: str) -> bytes:
         axes.plot([min(values), max(values)], [y, y], color='#d5d8dc', lw=3, zorder=1)
         for tracker, value in zip(measured.trackers, values, strict=True):
             label = tracker if y == 0 else None
-            axes.scatter(value, y, s=34, color=palette[tracker], zorder=2, label=label)
+            axes.scatter(
+                value, y, s=34, color=palette[tracker], marker=markers[tracker], zorder=2,
+                label=label,
+            )  # fmt: skip
     axes.set_yticks(range(len(order)), order)
     axes.set(xlim=(-1, 101), xlabel='success % (Princeton, 0.5)', ylim=(-0.7, len(order) - 0.3))
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(
         fontsize=8, frameon=False, loc='lower center', bbox_to_anchor=(0.5, 1.0),
         ncols=min(5, len(measured.trackers)),
     )  # fmt: skip
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def long_term_plot(curves: Mapping[str, LongTerm]) -> bytes:
     """Precision over recall while the score's threshold falls."""
-    figure = _figure(5.2, 4.2)
+    figure = plot_style.figure(5.2, 4.2)
     axes = figure.add_subplot()
-    palette = colors(list(curves))
+    strokes, palette = plot_style.strokes(list(curves)), plot_style.colors(list(curves))
     for tracker, c in curves.items():
         label = f'{tracker} [F {c.f_score:.3f}]'
-        axes.plot(c.recalls, c.precisions, color=palette[tracker], lw=1.8, label=label)
+        axes.plot(c.recalls, c.precisions, **strokes[tracker], lw=1.8, label=label)
         axes.plot(c.recall, c.precision, 'o', color=palette[tracker], ms=6)
     axes.set(
         xlabel='recall', ylabel='precision', xlim=(0, 1), ylim=(0, 1.02),
         title='Long-term precision and recall',
     )  # fmt: skip
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def reliability_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
     """Share of right boxes over published score, and how many boxes have that score."""
-    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    palette = plot_style.colors(list(dict.fromkeys(tracker for tracker, _ in found)))
     panels = [
         (f'{tracker}, {data} data', scored.reliability, palette[tracker])
         for (tracker, data), scored in found.items()
@@ -133,14 +124,14 @@ def reliability_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
 
 def pairs_plot(found: Mapping[str, Reliability]) -> bytes:
     """Share of pairs of one person over the probability given."""
-    palette = colors(list(found))
+    palette = plot_style.colors(list(found))
     return _calibration([(n, t, palette[n]) for n, t in found.items()], 'probability', 'pairs')
 
 
 def _calibration(panels: Sequence[tuple[str, Reliability, str]], across: str, what: str) -> bytes:
     columns = min(4, len(panels))
     rows = -(-len(panels) // columns)
-    figure = _figure(3.1 * columns + 0.4, 3.2 * rows)
+    figure = plot_style.figure(3.1 * columns + 0.4, 3.2 * rows)
     for index, (name, table, color) in enumerate(panels):
         axes = figure.add_subplot(rows, columns, index + 1)
         centers = (table.edges[:-1] + table.edges[1:]) / 2
@@ -154,17 +145,17 @@ def _calibration(panels: Sequence[tuple[str, Reliability, str]], across: str, wh
         )  # fmt: skip
         axes.set(xlim=(0, 1), ylim=(0, 1.02), xlabel=across)
         axes.set_title(f'{name}\nerror {table.expected_error:.3f}', fontsize=9)
-        _tidy(axes)
+        plot_style.tidy(axes)
         if index == 0:
             axes.legend(fontsize=7, frameon=False, loc='upper left')
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
     """Of the boxes of a score and above, the share on the target; real and simulated data apart."""
-    figure = _figure(5.2, 3.6)
+    figure = plot_style.figure(5.2, 3.6)
     axes = figure.add_subplot()
-    palette = colors(list(dict.fromkeys(tracker for tracker, _ in found)))
+    palette = plot_style.colors(list(dict.fromkeys(tracker for tracker, _ in found)))
     lines = {REAL: '-', SIMULATED: '--'}
     for (tracker, data), scored in found.items():
         curve = scored.on_target
@@ -177,24 +168,24 @@ def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
         xlim=(0, 1), ylim=(0, 1.02), xlabel='score and above', ylabel='boxes on the target',
         title='What a score is worth',
     )  # fmt: skip
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False, loc='lower left')
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def expected_overlap_plot(
     runs: Mapping[tuple[str, str], vot.ShortTermRun], lengths: tuple[int, int] | None = None
 ) -> bytes:
     """VOT's expected average overlap over sequence length, the averaged lengths shaded."""
-    figure = _figure(5.2, 3.6)
+    figure = plot_style.figure(5.2, 3.6)
     axes = figure.add_subplot()
     trackers = list(dict.fromkeys(t for t, _ in runs))
-    palette = colors(trackers)
+    strokes = plot_style.strokes(trackers)
     for tracker in trackers:
         own = [run for (t, _), run in runs.items() if t == tracker]
         longest = max(len(r.codes) for r in own)
         curve = vot.expected_overlap_curve(own, longest)
-        axes.plot(np.arange(1, longest + 1), curve, color=palette[tracker], lw=1.8, label=tracker)
+        axes.plot(np.arange(1, longest + 1), curve, **strokes[tracker], lw=1.8, label=tracker)
         low, high = lengths or vot.typical_lengths([len(r.codes) for r in own])
         if tracker == trackers[0]:
             axes.axvspan(low, max(high, low + 1), color=_PARTLY, zorder=0)
@@ -202,16 +193,16 @@ def expected_overlap_plot(
         xlabel='sequence length (frames)', ylabel='expected average overlap', ylim=(0, 1.02),
         title='VOT: expected average overlap',
     )  # fmt: skip
-    _tidy(axes)
+    plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False)
-    return _png(figure)
+    return plot_style.png(figure)
 
 
 def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> bytes:
     """Centre error and IoU over time, frames without the target shaded."""
     first = results[0]
     seconds = (np.array(first.stamps_ns, np.float64) - first.stamps_ns[0]) / 1e9
-    figure = _figure(9.5, 3.4)
+    figure = plot_style.figure(9.5, 3.4)
     error_axes = figure.add_subplot(2, 1, 1)
     iou_axes = figure.add_subplot(2, 1, 2, sharex=error_axes)
     absent = ~first.frames.there
@@ -219,14 +210,15 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
     for axes in (error_axes, iou_axes):
         _shade(axes, seconds, absent, _ABSENT)
         _shade(axes, seconds, partly, _PARTLY)
-        _tidy(axes)
+        plot_style.tidy(axes)
+    strokes = plot_style.strokes(list(palette))
     for row, r in enumerate(results):
-        c, color = r.frames, palette[r.tracker]
+        c, color, stroke = r.frames, palette[r.tracker], strokes[r.tracker]
         error_axes.plot(
-            seconds, np.minimum(c.error, ERROR_CAP_PX), color=color, lw=1.2, label=r.tracker
+            seconds, np.minimum(c.error, ERROR_CAP_PX), **stroke, lw=1.2, label=r.tracker
         )
         shown = np.where(c.there, np.nan_to_num(c.overlap), np.nan)
-        iou_axes.plot(seconds, shown, color=color, lw=1.2)
+        iou_axes.plot(seconds, shown, **stroke, lw=1.2)
         false = c.said & ~c.there
         iou_axes.plot(
             seconds[false], np.full(false.sum(), -0.07 - 0.07 * row), '|', color=color, ms=4, mew=1
@@ -242,7 +234,7 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
         ylabel='IoU', xlabel='time (s)', ylim=(-0.07 * (len(results) + 1), 1.03),
         xlim=(seconds[0], max(seconds[-1], seconds[0] + 1e-3)), yticks=(0, 0.5, 1),
     )  # fmt: skip
-    return _png(figure, 90)
+    return plot_style.png(figure, 90)
 
 
 def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
@@ -257,22 +249,3 @@ def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
 def _mean(curves: Sequence[Array], size: int) -> Array:
     mean: Array = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
     return mean
-
-
-def _figure(width: float, height: float) -> Figure:
-    figure = Figure(figsize=(width, height), layout='constrained')
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def _tidy(axes: Axes) -> None:
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.grid(color='#e3e5e8', lw=0.6)
-    axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8)
-
-
-def _png(figure: Figure, dpi: int = _DPI) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format='png', dpi=dpi)
-    return buffer.getvalue()

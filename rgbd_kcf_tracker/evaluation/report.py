@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.evaluation import (
     everyone_tables,
     identity_tables,
     page,
+    plot_style,
     plots,
     tables,
     thesis_tables,
@@ -107,7 +108,7 @@ def write_report(
     }
     write_json(folder / 'report.json', numbers, indent=1)
 
-    palette = plots.colors(measured.trackers)
+    palette = plot_style.colors(measured.trackers)
     main = main_tracker(measured.trackers, contenders, heading.ablated)
     content |= {
         'curves': page.uri(plots.curve_plots(measured, curves)),
@@ -155,7 +156,7 @@ def write_everyone_report(
         'sequences': {r.sequence: {'scenario': r.scenario, 'kind': EVERYONE} for r in results},
     }
     write_json(folder / 'report.json', numbers, indent=1)
-    palette = plots.colors(list(dict.fromkeys(r.tracker for r in results)))
+    palette = plot_style.colors(list(dict.fromkeys(r.tracker for r in results)))
     content = {'everyone': every} | _head(
         heading, failures, palette, {r.sequence: r.frames for r in results}
     )

@@ -180,6 +180,21 @@ class OutputFile:
             raise RecordingError(cannot_write(self.path, error)) from None
 
 
+def write_file(path: str | os.PathLike[str], data: bytes, overwrite: bool = False) -> None:
+    """Write a file that is in memory; see :class:`OutputFile`.
+
+    Raises:
+        RecordingError: where it cannot be written, or is there already.
+    """
+    output = OutputFile(path, overwrite)
+    try:
+        output.write(data)
+    except BaseException:
+        output.end(whole=False, anything=False)
+        raise
+    output.end(whole=True, anything=True)
+
+
 class OutputFolder:
     """A folder that is written; see the module for where.
 

@@ -1,0 +1,290 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page over a running tracker: a node of its own that only listens and asks.
+
+It subscribes to the images while somebody looks and to nothing larger than a box while nobody does,
+in another process than the tracker, which neither waits for it nor knows of it.
+"""
+
+from __future__ import annotations
+
+import queue
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PointStamped, PolygonStamped
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.live.settings import RAW
+from rgbd_kcf_tracker.parameters import ParameterInfo, describe
+from rgbd_kcf_tracker.recordings.images import (
+    decode_color,
+    decode_compressed_color,
+    decode_compressed_depth,
+    decode_depth,
+)
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_from_info, stamp_of
+from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
+from rgbd_kcf_tracker.variants import default_parameters
+from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.live_page import LivePage, ViewerParameters, node_parameter
+
+POLL_S = 0.05
+SETTINGS_S = 2.0
+LINGER_S = 3.0
+"""Seconds after the last browser has gone in which the images are still listened to."""
+PAIR_NS = 20_000_000
+HELD = 6
+"""Images that are kept for their partner."""
+
+
+class ViewerNode(Node):
+    """Listens to a tracker node for the page.
+
+    Args:
+        options: passed on to rclpy's node.
+
+    Attributes:
+        page: what the server serves.
+        settings: the parameters, read once.
+
+    Raises:
+        ParameterError: for a parameter that cannot be.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__('viewer', **options)
+        self.settings = self._declared()
+        tracker = self.settings.tracker.rstrip('/')
+        # Its full name, as diagnostics and messages to people have it.
+        self._tracker = self.resolve_topic_name(f'{tracker}/box').removesuffix('/box')
+        self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
+        light = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.create_subscription(Bool, f'{tracker}/occluded', self._on_occluded, light)
+        self.create_subscription(PointStamped, f'{tracker}/position', self._on_position, light)
+        self.create_subscription(PolygonStamped, f'{tracker}/box', self._on_box, light)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self._init = self.create_publisher(RegionOfInterest, f'{tracker}/init', 10)
+        self._init_point = self.create_publisher(PointStamped, f'{tracker}/init_point', 10)
+        self._reset = self.create_client(Trigger, f'{tracker}/reset')
+        self._remote = AsyncParameterClient(self, tracker)
+        self._images: list[Any] = []
+        self._depths: dict[int, Any] = {}
+        self._colors: dict[int, Any] = {}
+        self._camera: tuple[Intrinsics, int, int] | None = None
+        self._unwatched = 0.0
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(POLL_S, self._poll, clock=steady)
+        self.create_timer(SETTINGS_S, self._ask_settings, clock=steady)
+
+    def _declared(self) -> ViewerParameters:
+        values = {}
+        for info in describe(ViewerParameters):
+            try:
+                declared = self.declare_parameter(info.name, info.default, _descriptor(info))
+            except Exception as error:  # rclpy has no common class for overrides of a wrong type
+                raise ParameterError(f'parameter {info.name}: {error}') from None
+            values[info.name] = declared.value
+        return ViewerParameters(**values)
+
+    # -- what comes -------------------------------------------------------------------------------
+
+    def _on_occluded(self, message: Bool) -> None:
+        self.page.occluded(bool(message.data))
+
+    def _on_position(self, message: PointStamped) -> None:
+        p = message.point
+        self.page.position(stamp_of(message), (float(p.x), float(p.y), float(p.z)))
+
+    def _on_box(self, message: PolygonStamped) -> None:
+        try:
+            box = box_from_polygon(message.polygon.points)
+        except RgbdKcfError:
+            return
+        self.page.answer(stamp_of(message), box)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.partition(':')[0].strip('/ ') == self._tracker.strip('/'):
+                self.page.figures({pair.key: pair.value for pair in status.values})
+
+    def _on_info(self, message: CameraInfo) -> None:
+        try:
+            intrinsics = intrinsics_from_info(message)
+        except RgbdKcfError:
+            return
+        if intrinsics is not None:
+            self._camera = (intrinsics, int(message.width), int(message.height))
+
+    def _on_color(self, message: Any) -> None:
+        if self.page.due():
+            self._colors[stamp_of(message)] = message
+            self._thin(self._colors)
+
+    def _on_depth(self, message: Any) -> None:
+        if self.page.due():
+            self._depths[stamp_of(message)] = message
+            self._thin(self._depths)
+
+    @staticmethod
+    def _thin(held: dict[int, Any]) -> None:
+        while len(held) > HELD:
+            del held[next(iter(held))]
+
+    # -- what is shown ----------------------------------------------------------------------------
+
+    def _poll(self) -> None:
+        self._listen_or_not()
+        while True:
+            try:
+                command = self.page.commands.get_nowait()
+            except queue.Empty:
+                break
+            try:
+                self._carry_out(command)
+            except RgbdKcfError as error:
+                self.page.say(str(error))
+        if self.page.due() and self._colors:
+            self._show()
+
+    def _listen_or_not(self) -> None:
+        """Subscribe to the images when somebody looks, and no more a while after all have gone."""
+        if self.page.board.watched:
+            self._unwatched = 0.0
+            if not self._images:
+                self._listen()
+            return
+        self._unwatched += POLL_S
+        if self._images and self._unwatched >= LINGER_S:
+            for made in self._images:
+                self.destroy_subscription(made)
+            self._images.clear()
+            self._colors.clear()
+            self._depths.clear()
+
+    def _listen(self) -> None:
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST, depth=2, reliability=ReliabilityPolicy.BEST_EFFORT
+        )
+        for topic, transport, callback in (
+            (COLOR, self.settings.color_transport, self._on_color),
+            (DEPTH, self.settings.depth_transport, self._on_depth),
+        ):
+            kind, name = (Image, topic)
+            if transport != RAW:
+                kind, name = CompressedImage, f'{self.resolve_topic_name(topic)}/{transport}'
+            self._images.append(self.create_subscription(kind, name, callback, qos))
+        self._images.append(self.create_subscription(CameraInfo, CAMERA_INFO, self._on_info, qos))
+
+    def _show(self) -> None:
+        """The newest image that has its depth; the newest of all where none has."""
+        paired = [s for s in self._colors if self._depth_of(s) is not None]
+        stamp = max(paired or self._colors)
+        color, depth = self._colors[stamp], self._depth_of(stamp)
+        if depth is None and self._depths and len(self._colors) < HELD:
+            return  # its depth may still come
+        self._colors.clear()
+        raw = self.settings.color_transport == RAW
+        try:
+            image = decode_color(color) if raw else decode_compressed_color(color)
+        except RgbdKcfError as error:
+            self.page.say(f'colour image cannot be read: {error}')
+            return
+        self.page.image(self._frame(image, depth, stamp), stamp)
+
+    def _depth_of(self, stamp: int) -> Any:
+        nearest = min(self._depths, key=lambda s: abs(s - stamp), default=None)
+        return None if nearest is None or abs(nearest - stamp) > PAIR_NS else self._depths[nearest]
+
+    def _frame(self, color: Any, depth: Any, stamp: int) -> Frame:
+        height, width = color.shape[:2]
+        camera = None
+        if self._camera is not None and self._camera[1:] in ((width, height), (0, 0)):
+            camera = self._camera[0]
+        if depth is not None:
+            raw = self.settings.depth_transport == RAW
+            try:
+                metres = decode_depth(depth) if raw else decode_compressed_depth(depth)
+                return Frame(color, metres, stamp, camera)
+            except RgbdKcfError as error:
+                self.page.say(f'depth image cannot be used: {error}')
+        return Frame(color, None, stamp, camera)
+
+    # -- what is asked ----------------------------------------------------------------------------
+
+    def _carry_out(self, command: Command) -> None:
+        values = command.values
+        if command.do == 'box':
+            x, y = max(round(values['x']), 0), max(round(values['y']), 0)
+            width, height = round(values['width']), round(values['height'])
+            if not (0 < width < 2**31 and 0 < height < 2**31 and x < 2**31 and y < 2**31):
+                raise ParameterError('that box has no size')
+            self._init.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+        elif command.do == 'point':
+            message = PointStamped()
+            message.point.x, message.point.y = values['x'], values['y']
+            self._init_point.publish(message)
+        elif command.do == 'remove':
+            if not self._reset.service_is_ready():
+                raise ParameterError(f'{self._tracker} does not answer: is it running?')
+            self._reset.call_async(Trigger.Request())
+        elif command.do in ('variant', 'parameter'):
+            name, value = node_parameter(command, self.page.variant)
+            self._set([Parameter(name, value=value)])
+        elif command.do == 'defaults':
+            variant = self.page.variant
+            defaults = default_parameters(variant)
+            self._set(
+                [
+                    Parameter(f'{variant}.{i.name}', value=getattr(defaults, i.name))
+                    for i in describe(type(defaults))
+                ]
+            )
+        else:
+            raise ParameterError(f'{command.do} is for recordings: this is live')
+
+    def _set(self, parameters: list[Parameter]) -> None:
+        if not self._remote.services_are_ready():
+            raise ParameterError(f'{self._tracker} does not answer: is it running?')
+        self._remote.set_parameters(parameters, callback=self._was_set)
+
+    def _was_set(self, future: Any) -> None:
+        refused = [r.reason for r in future.result().results if not r.successful]
+        if refused:
+            self.page.say(refused[0])
+        self._ask_settings()
+
+    def _ask_settings(self) -> None:
+        """Ask the tracker for its parameters while somebody looks."""
+        if not self.page.board.watched or not self._remote.services_are_ready():
+            return
+        variant = self.page.variant
+        names = ['variant']
+        names += [f'{variant}.{i.name}' for i in describe(type(default_parameters(variant)))]
+
+        def told(future: Any) -> None:
+            told_values = future.result().values
+            if len(told_values) == len(names):
+                self.page.values = {
+                    name: parameter_value_to_python(value)
+                    for name, value in zip(names, told_values, strict=True)
+                }
+
+        self._remote.get_parameters(names, callback=told)
+
+
+def _descriptor(info: ParameterInfo) -> Any:
+    from rcl_interfaces.msg import ParameterDescriptor
+
+    return ParameterDescriptor(description=info.description, read_only=True)

@@ -1,0 +1,339 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Depth and re-detection step by step: the thesis's figures 4.2 to 4.5 and 4.8 to 4.11."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from rgbd_kcf_tracker.evaluation import plot_style
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.thesis import centre_patch, depth_patch, sliding_window
+from rgbd_kcf_tracker.thesis.correlation import CorrelationFilter
+from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker
+from rgbd_kcf_tracker.thesis.depth_patch import DepthDifference, DepthPatch
+from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters, RgbdTracker
+from rgbd_kcf_tracker.track import TrackState
+from rgbd_kcf_tracker.view.explain.moments import DepthMoments, Moment
+from rgbd_kcf_tracker.view.explain.picture import (
+    GIVEN,
+    OTHER,
+    SEEN,
+    Array,
+    Picture,
+    centred,
+    draw_box,
+    legend,
+    rgb,
+    show_heat,
+    show_image,
+    show_mesh,
+)
+from rgbd_kcf_tracker.view.watch import Call, name_of
+
+_DIFFERENCE = name_of(DepthPatch.diff_at_centre)
+_SEARCH = name_of(RgbdTracker._search)
+_PATCH = name_of(centre_patch.centre_patch)
+
+
+def depth_pictures(moments: DepthMoments) -> list[Picture]:
+    """The pictures of chapter 4, as far as the recording has what they show."""
+    pictures: list[Picture] = []
+    compared = _compared(moments.seen)
+    if compared is not None and moments.seen is not None:
+        pictures.append(_patches(moments.seen, compared))
+        adjusted = moments.adjusted or moments.seen
+        pictures.append(_adjusting(adjusted, _compared(adjusted) or compared))
+        pictures.append(_difference(moments.seen, compared, '4.4', 'without'))
+    hiding = _compared(moments.hiding)
+    if hiding is not None and moments.hiding is not None:
+        pictures.append(_difference(moments.hiding, hiding, '4.5', 'with'))
+    if moments.seen is not None:
+        pictures.append(_search_space(moments.seen, moments.hidden))
+        pictures.append(_correlations(moments.seen))
+    shown = [
+        (word, moment)
+        for word, moment in (
+            ('visible', moments.seen),
+            ('partly hidden', moments.partly),
+            ('hidden', moments.hidden),
+        )
+        if moment is not None and moment.of(_SEARCH)
+    ]
+    if shown:
+        pictures.append(_responses(shown))
+    if moments.readings:
+        pictures.append(_over_time(moments))
+    return pictures
+
+
+def _compared(moment: Moment | None) -> Call | None:
+    """The comparison of depths that decided in a frame: the last that came to a result."""
+    if moment is None:
+        return None
+    calls = [call for call in moment.of(_DIFFERENCE) if call.value is not None]
+    return calls[-1] if calls else None
+
+
+def _patches(moment: Moment, call: Call) -> Picture:
+    depth = moment.frame.depth
+    assert depth is not None
+    remembered, patch = call.given['self']['_patch'], call.given['patch']
+    box = moment.of(_PATCH)[0].given['box']
+    share = moment.of(_PATCH)[0].given['share']
+    low, high = _range(remembered, patch)
+    figure = plot_style.figure(9.5, 6.4)
+    axes = figure.subplots(2, 2, height_ratios=(1, 1.1))
+    show_image(axes[0, 0], rgb(moment.frame), f'frame {moment.number}')
+    show_heat(axes[0, 1], np.where(depth > 0, depth, np.nan), 'depth', 'depth (m)')
+    for one in axes[0]:
+        draw_box(one, box, SEEN, 'target')
+        middle = Box.from_center(box.cx, box.cy, box.width * share, box.height * share)
+        draw_box(one, middle, GIVEN, 'centre patch')
+        one.set_xticks([])
+        one.set_yticks([])
+    legend(axes[0, 0])
+    show_heat(axes[1, 0], remembered, 'centre patch, remembered', 'depth (m)', low=low, high=high)
+    show_heat(axes[1, 1], patch, 'centre patch, new', 'depth (m)', low=low, high=high)
+    for one in axes[1]:
+        one.set(xlabel='x (samples)', ylabel='y (samples)')
+    return Picture(
+        '4.2', 'centre_patch', 'The depth about the centre of the target',
+        'Only the middle of the box is looked at, because at its edges there is background: at '
+        'the left the patch of the last frame that surely showed the target, at the right this '
+        'frame\'s. Grey means no reading, or not the target.',
+        '', (_PATCH, name_of(DepthPatch.remember)), plot_style.png(figure),
+        {'remembered': remembered, 'patch': patch, 'box': box.as_tuple()},
+    )  # fmt: skip
+
+
+def _range(*patches: Array) -> tuple[float, float]:
+    values = np.concatenate([p[np.isfinite(p)].ravel() for p in patches])
+    if not values.size:
+        return 0.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    return low, max(high, low + 0.01)
+
+
+def _adjusting(moment: Moment, call: Call) -> Picture:
+    size, result = call.found['size'], call.value
+    figure = plot_style.figure(9.5, 4.2)
+    high = max(float(size.max()), 0.05)
+    show_mesh(
+        figure, (1, 2, 1), size, f'frame {moment.number}, before adjusting', 'difference (m)',
+        low=0, high=high, axes_label='samples',
+    )  # fmt: skip
+    show_mesh(
+        figure, (1, 2, 2), size[result.rows, result.cols],
+        f'after: {_cut(size, result)}', 'difference (m)',
+        low=0, high=high, axes_label='samples',
+    )  # fmt: skip
+    return Picture(
+        '4.3', 'adjusting', 'The patch adjusts itself',
+        'The difference of the two patches; where the target has shifted in its box, background '
+        'stands at the edge like a wall. Edge columns and rows that differ too much are cut away, '
+        'a quarter of the patch at most.',
+        r'D = \vert\,patch - (remembered + motion)\,\vert',
+        (_DIFFERENCE, name_of(depth_patch.trim)), plot_style.png(figure),
+        {'before': size, 'after': size[result.rows, result.cols]},
+    )  # fmt: skip
+
+
+def _cut(size: Array, result: DepthDifference) -> str:
+    rows = size.shape[0] - (result.rows.stop - result.rows.start)
+    cols = size.shape[1] - (result.cols.stop - result.cols.start)
+    return f'{rows} rows and {cols} columns cut away'
+
+
+def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
+    result, size = call.value, call.found['size']
+    remembered, patch = call.given['self']['_patch'], call.given['patch']
+    left = size[result.rows, result.cols]
+    low, high = _range(remembered, patch)
+    figure = plot_style.figure(9.5, 3.6)
+    show_heat(
+        figure.add_subplot(1, 3, 1), remembered, 'remembered', 'depth (m)', low=low, high=high
+    )
+    show_heat(
+        figure.add_subplot(1, 3, 2), patch, f'frame {moment.number}', 'depth (m)',
+        low=low, high=high,
+    )  # fmt: skip
+    show_mesh(
+        figure, (1, 3, 3), left, f'difference: {result.value:.3f} m', '(m)',
+        low=0, high=0.5, axes_label='samples',
+    )  # fmt: skip
+    hidden = moment.track.state is not TrackState.TRACKING
+    threshold = RgbdParameters().depth_threshold
+    what = (
+        f'After adjusting, {result.value:.3f} m are left on average, of which '
+        f'{abs(result.nearer):.3f} m came nearer; the threshold is {threshold:g} m.'
+    )
+    verdict = 'What is left is flat: nothing has come in front, and the target counts as seen.'
+    if hidden and result.nearer >= threshold:
+        verdict = (
+            'The difference reaches the middle of the patch, which no cutting at the edges '
+            'removes: something has come in front, and there is no box.'
+        )
+    elif hidden:
+        verdict = (
+            f'{100 * result.farther:.0f} % of the patch shows something farther away than the '
+            'target: it is not there any more, and there is no box.'
+        )
+    return Picture(
+        number, f'difference_{word}', f'The difference {word} an occluder',
+        f'{what} {verdict}', r'D_{diff} = \mathrm{mean}\,\vert\,patch - remembered\,\vert',
+        (_DIFFERENCE, name_of(DepthAwareTracker._occlusion_status)), plot_style.png(figure),
+        {
+            'remembered': remembered, 'patch': patch, 'difference': left,
+            'D_diff': result.value, 'nearer': result.nearer,
+        },
+    )  # fmt: skip
+
+
+def _reach(moment: Moment) -> tuple[Box, Array, float]:
+    """The box looked about, the centres of all windows, and the span, in one frame."""
+    search = moment.of(_SEARCH)[0]
+    box = search.given['self']['_box']
+    span = moment.of(name_of(sliding_window.search_span))[0].value
+    return box, search.found['cx'], span
+
+
+def _search_space(moment: Moment, hidden: Moment | None) -> Picture:
+    shown = [moment] if hidden is None else [moment, hidden]
+    figure = plot_style.figure(9.5, 3.6 if len(shown) > 1 else 5.0)
+    values: dict[str, Any] = {}
+    for index, one in enumerate(shown):
+        axes = figure.add_subplot(1, len(shown), index + 1)
+        box, centres, span = _reach(one)
+        show_image(
+            axes, rgb(one.frame), f'frame {one.number}, {one.track.state.value}: '
+            f'{len(centres)} windows, ±{span:.0f} px',
+        )  # fmt: skip
+        space = Box.from_corners(
+            box.cx - span - box.width / 2, box.y, box.cx + span + box.width / 2, box.bottom
+        ).clipped(one.frame.width, one.frame.height)
+        if space is not None:
+            draw_box(axes, space, OTHER, 'search space', '--')
+        draw_box(axes, box, SEEN, 'last position')
+        axes.plot(centres, np.full(len(centres), box.cy), '|', color='white', ms=12, mew=3)
+        axes.plot(
+            centres, np.full(len(centres), box.cy), '|', color=GIVEN, ms=12, mew=1.5,
+            label='windows',
+        )  # fmt: skip
+        axes.set_xlim(-0.5, one.frame.width - 0.5)
+        axes.set_ylim(one.frame.height - 0.5, -0.5)
+        legend(axes)
+        values[f'centres_{one.number}'] = centres
+        values[f'span_{one.number}'] = span
+    return Picture(
+        '4.8, 4.9', 'search_space', 'The search space',
+        'The window slides along the horizontal, because people do not fly; how far grows with the '
+        "target's width, so that a near target is not lost and a far one costs no more. While it "
+        'is hidden the space grows with every moment, until the whole image is searched.',
+        r'span = (s + \lceil v \cdot t_{hidden} \rceil) \cdot width',
+        (name_of(sliding_window.search_span), _SEARCH), plot_style.png(figure), values,
+    )  # fmt: skip
+
+
+def _correlations(moment: Moment) -> Picture:
+    search = moment.of(_SEARCH)[0]
+    kernels = moment.of('thesis.correlation:_gaussian')[0].value
+    index = search.found['index']
+    kernel = kernels[index]
+    figure = plot_style.figure(9.5, 4.2)
+    show_mesh(
+        figure, (1, 2, 1), centred(kernel), 'the best of all windows', 'kernel',
+        low=float(kernel.min()),
+    )  # fmt: skip
+    axes = figure.add_subplot(1, 2, 2)
+    best = kernels.max(axis=(1, 2))
+    axes.plot(search.found['cx'], best, 'o-', color=SEEN, ms=4)
+    axes.plot(search.found['cx'][index], best[index], 's', color=GIVEN, ms=8, label='the best')
+    axes.set(xlabel='centre of the window (px)', ylabel='highest kernel value')
+    axes.legend(fontsize=8, frameon=False)
+    plot_style.tidy(axes)
+    return Picture(
+        '4.10', 'correlations', 'Correlation with every patch of the search space',
+        'The features of every window are compared with those learned, all windows in one batch. '
+        'At the right the likeness of each window, at the left the best one at all its shifts.',
+        r'k^{xz} = \exp\left(-\frac{1}{\sigma^2 N}\left(\Vert x\Vert^2 + \Vert z\Vert^2'
+        r' - 2F^{-1}(\hat{x}^* \odot \hat{z})\right)\right)',
+        ('thesis.correlation:_gaussian', _SEARCH), plot_style.png(figure),
+        {'kernel': kernel, 'best': best},
+    )  # fmt: skip
+
+
+def _responses(shown: list[tuple[str, Moment]]) -> Picture:
+    figure = plot_style.figure(3.3 * len(shown), 5.6)
+    values: dict[str, Any] = {}
+    peaks = []
+    for index, (word, moment) in enumerate(shown):
+        search = moment.of(_SEARCH)[0]
+        response = search.found['responses'][search.found['index']]
+        best = search.value[0]
+        axes = figure.add_subplot(2, len(shown), index + 1)
+        show_image(axes, rgb(moment.frame), f'{word}: frame {moment.number}')
+        if moment.track.box is not None:
+            draw_box(axes, moment.track.box, SEEN)
+        looked = Box.from_center(
+            best.cx, best.cy, search.given['self']['_box'].width,
+            search.given['self']['_box'].height,
+        )  # fmt: skip
+        draw_box(axes, looked, OTHER, style='--')
+        show_mesh(
+            figure, (2, len(shown), len(shown) + index + 1), centred(response),
+            f'highest response {best.response:.2f}', 'response', low=min(0.0, response.min()),
+            high=1.0,
+        )  # fmt: skip
+        values[f'response_{word.replace(" ", "_")}'] = response
+        peaks.append(f'{best.response:.2f} when {word}')
+    return Picture(
+        '4.11', 'responses', 'The response of a target that is seen, covered, and hidden',
+        f'The highest response is {", ".join(peaks)}: the more is hidden, the lower the hill. '
+        'The dashed box is where the best patch lies; above 0.5 it is the target whatever the '
+        'depth says, below that the depth is asked.',
+        r'f(z) = F^{-1}(\hat{k}^{xz} \odot \hat{\alpha})',
+        (name_of(CorrelationFilter.respond), _SEARCH), plot_style.png(figure), values,
+    )  # fmt: skip
+
+
+def _over_time(moments: DepthMoments) -> Picture:
+    numbers = np.array([r[0] for r in moments.readings])
+    states = np.array([r[1] for r in moments.readings])
+    response = np.array([r[2] for r in moments.readings])
+    difference = np.array([r[3] for r in moments.readings])
+    figure = plot_style.figure(9.5, 4.0)
+    top, low = figure.subplots(2, 1, sharex=True)
+    top.plot(numbers, response, color=SEEN, lw=1.5, label='response')
+    top.axhline(RgbdParameters().detect_threshold, color='#555555', lw=1, ls='--')
+    top.set(ylabel='response', ylim=(0, max(1.0, float(response.max()) * 1.05)))
+    low.plot(numbers, difference, color=GIVEN, lw=1.5, label='depth difference')
+    low.axhline(RgbdParameters().depth_threshold, color='#555555', lw=1, ls='--')
+    low.set(ylabel='D_diff (m)', xlabel='frame')
+    for axes in (top, low):
+        plot_style.tidy(axes)
+        for start, stop in _spells(states != TrackState.TRACKING.value):
+            axes.axvspan(numbers[start] - 0.5, numbers[stop - 1] + 0.5, color='#c9ccd1', lw=0)
+        for moment, mark in ((moments.seen, 'v'), (moments.partly, 's'), (moments.hidden, 'x')):
+            if moment is not None:
+                row = int(np.searchsorted(numbers, moment.number))
+                ys = response if axes is top else difference
+                if row < len(ys) and math.isfinite(ys[row]):
+                    axes.plot(numbers[row], ys[row], mark, color='black', ms=7)
+    return Picture(
+        '', 'over_time', 'Response and depth over time',
+        'The two readings that Algorithm 1 decides by, with their thresholds dashed; grey is where '
+        'the target counted as hidden. The marks are the frames shown above: visible (triangle), '
+        'partly hidden (square), hidden (cross).',
+        '', (_SEARCH, _DIFFERENCE), plot_style.png(figure),
+        {'frames': numbers, 'response': response, 'D_diff': difference},
+    )  # fmt: skip
+
+
+def _spells(mask: Array) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -1,0 +1,232 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the live page keeps of a tracker node's topics; knows no ROS, only what messages say."""
+
+from __future__ import annotations
+
+import io
+import queue
+import time
+from collections import OrderedDict, deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
+from rgbd_kcf_tracker.parameters import Parameters, parameter
+from rgbd_kcf_tracker.recordings.results import HEADER, row
+from rgbd_kcf_tracker.track import Track, TrackState
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, default_parameters
+from rgbd_kcf_tracker.view.board import Board
+from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
+from rgbd_kcf_tracker.view.showing import Detail, Seen, show
+
+TARGET = 1
+"""The node follows one target; this is its id in the page."""
+_ANSWERS = 64
+_MOST_ROWS = 200_000
+_MOST_COMMANDS = 64
+
+
+@dataclass(frozen=True)
+class ViewerParameters(Parameters):
+    """Parameters of the viewer node."""
+
+    tracker: str = parameter('tracker', 'Name of the tracker node, with its namespace.')
+    host: str = parameter(
+        '127.0.0.1', 'Address to listen on; any but a loopback address needs a token.'
+    )
+    port: int = parameter(8080, 'TCP port of the page.', minimum=0, maximum=65535)
+    token: str = parameter(
+        '', 'Asked for before anything is shown; better in the environment variable RGBD_KCF_TOKEN.'
+    )
+    rate: float = parameter(
+        10.0, 'Moments shown each second, at most.', unit='Hz', minimum=0.2, maximum=60.0
+    )
+    color_transport: str = parameter(
+        RAW, 'How colour images arrive.', choices=(RAW, COMPRESSED), source='image_transport'
+    )
+    depth_transport: str = parameter(
+        RAW,
+        'How depth images arrive.',
+        choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
+        source='image_transport',
+    )
+
+
+class LivePage:
+    """Answers and images of a tracker node, put together by their stamps.
+
+    Args:
+        title: of the page.
+        rate_hz: moments put up each second at most.
+        detail: of what is sent.
+    """
+
+    def __init__(self, title: str, rate_hz: float, detail: Detail | None = None) -> None:
+        self.board = Board()
+        self.commands: queue.Queue[Command] = queue.Queue(_MOST_COMMANDS)
+        self.values: dict[str, Any] = {}
+        self._title, self._period = title, 1 / rate_hz
+        self._detail = detail
+        self._answers: OrderedDict[int, Track] = OrderedDict()
+        self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
+        self._count = 0
+        self._origin_ns: int | None = None
+        self._hidden = False
+        self._position: tuple[int, tuple[float, float, float]] | None = None
+        self._figures: dict[str, str] = {}
+        self._word = ''
+        self._said = 0.0
+        self._shown_at = 0.0
+        self._name = 'target'
+
+    # -- what the page asks -----------------------------------------------------------------------
+
+    def do(self, command: Command) -> None:
+        """Take a request, for the node to carry out."""
+        try:
+            self.commands.put_nowait(command)
+        except queue.Full:
+            return
+
+    def description(self) -> dict[str, Any]:
+        """What does not change with every moment."""
+        return {
+            'title': self._title,
+            'live': True,
+            'frames': 0,
+            'variants': describe_variants(),
+            'several': False,
+        }
+
+    def boxes_csv(self) -> str:
+        """The boxes since the page was started, up to the last two hundred thousand."""
+        out = io.StringIO()
+        out.write(','.join(('id', *HEADER)) + '\n')
+        for number, stamp_ns, track in list(self._rows):
+            out.write(f'{TARGET},{row(number, stamp_ns, track)}\n')
+        return out.getvalue()
+
+    def parameters_yaml(self) -> str:
+        """The parameters of the node's variant, as far as it has told them."""
+        variant = self.variant
+        known = {
+            name.partition('.')[2]: value
+            for name, value in self.values.items()
+            if name.startswith(f'{variant}.')
+        }
+        return yaml_of(variant, default_parameters(variant).replace(**known))
+
+    @property
+    def variant(self) -> str:
+        """The node's, the default before it has told."""
+        name = self.values.get('variant', DEFAULT_VARIANT)
+        return name if name in VARIANTS else DEFAULT_VARIANT
+
+    # -- what the node says -----------------------------------------------------------------------
+
+    def occluded(self, hidden: bool) -> None:
+        """``~/occluded``, which comes before the box of the same frame."""
+        self._hidden = hidden
+
+    def position(self, stamp_ns: int, place: tuple[float, float, float]) -> None:
+        """``~/position``, likewise."""
+        self._position = (stamp_ns, place)
+
+    def figures(self, values: Mapping[str, str]) -> None:
+        """What ``/diagnostics`` says of the node."""
+        self._figures = dict(values)
+
+    def answer(self, stamp_ns: int, box: Box | None) -> None:
+        """``~/box``: the answer to a frame is complete."""
+        place = self._position[1] if self._position and self._position[0] == stamp_ns else None
+        state = TrackState.TRACKING
+        if box is None:
+            lost = self._figures.get('state') == 'LOST'
+            hidden = TrackState.LOST if lost else TrackState.OCCLUDED
+            state = hidden if self._hidden else TrackState.IDLE
+        # What the wire does not say is not known: a NaN is no score.
+        track = Track(box, state, float('nan'), None if place is None else place[2], place)
+        self._answers[stamp_ns] = track
+        while len(self._answers) > _ANSWERS:
+            self._answers.popitem(last=False)
+        if self._origin_ns is None or stamp_ns < self._origin_ns:
+            self._origin_ns = stamp_ns
+            self.board.rewind([])
+        self._count += 1
+        if state is not TrackState.IDLE:
+            self._rows.append((self._count - 1, stamp_ns, track))
+        self.board.note(
+            {
+                't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
+                'targets': [] if state is TrackState.IDLE else [(TARGET, state.value, None, 0)],
+                'track': _number(self._figures.get('work_median_ms')),
+            }
+        )
+
+    def due(self) -> bool:
+        """Whether somebody looks and the next moment may be put up."""
+        return self.board.watched and time.monotonic() - self._shown_at >= self._period
+
+    def image(self, frame: Frame, stamp_ns: int) -> None:
+        """Put up an image with the answer to it, or the last one before."""
+        self._shown_at = time.monotonic()
+        track = self._answers.get(stamp_ns)
+        if track is None and self._answers:
+            track = next(reversed(self._answers.values()))
+        tracks = {} if track is None or track.state is TrackState.IDLE else {TARGET: track}
+        origin = stamp_ns if self._origin_ns is None else self._origin_ns
+        variant = self.variant
+        prefix = f'{variant}.'
+        status = {
+            'time': round((stamp_ns - origin) * 1e-9, 3),
+            'playing': True,
+            'busy': '',
+            'word': self._word if time.monotonic() - self._said < 1.0 else '',
+            'variant': variant,
+            'values': {
+                name.removeprefix(prefix): value
+                for name, value in self.values.items()
+                if name.startswith(prefix)
+            },
+        }
+        if 'latency_median_ms' in self._figures:
+            status['latency'] = round(_number(self._figures['latency_median_ms']), 1)
+        if 'dropped' in self._figures:
+            status['dropped'] = int(_number(self._figures['dropped']))
+        header, blobs = show(Seen(frame, tracks, {TARGET: self._name}, status=status), self._detail)
+        self.board.show(header, blobs)
+
+    def say(self, word: str) -> None:
+        """Words for the page, with the next moment."""
+        self._word, self._said = word, time.monotonic()
+
+
+def _number(text: str | None) -> float:
+    try:
+        value = float(text or 0)
+    except ValueError:
+        return 0.0
+    return value if value == value and abs(value) < 1e12 else 0.0
+
+
+def node_parameter(command: Command, variant: str) -> tuple[str, Any]:
+    """The ROS parameter that a command sets: its name with the variant's prefix, its value.
+
+    Raises:
+        ParameterError: where there is no such parameter.
+    """
+    if command.do == 'variant':
+        if command.values['name'] not in VARIANTS:
+            raise ParameterError(f'unknown variant {command.values["name"]!r}')
+        return 'variant', command.values['name']
+    name, value = command.values['name'], command.values['value']
+    # Checked here too, so that what is refused is said in our words.
+    parameters = default_parameters(variant).replace(**{name: value})
+    return f'{variant}.{name}', getattr(parameters, name)

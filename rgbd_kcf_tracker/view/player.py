@@ -1,0 +1,509 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording that is played, stepped and sought while it is tracked.
+
+Every frame up to the farthest one reached is tracked once and remembered; going back shows what was
+said there. A new target, or another parameter, has the run go on from the frame that is shown.
+"""
+
+from __future__ import annotations
+
+import io
+import queue
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+from rgbd_kcf_tracker.parameters import Parameters, checked, describe
+from rgbd_kcf_tracker.recordings import Recording
+from rgbd_kcf_tracker.recordings.results import HEADER, row
+from rgbd_kcf_tracker.track import Track
+from rgbd_kcf_tracker.variants import VARIANTS, default_parameters
+from rgbd_kcf_tracker.view.board import HISTORY_S, Board
+from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
+from rgbd_kcf_tracker.view.insight import Insight
+from rgbd_kcf_tracker.view.showing import GALLERY_HEIGHT, Detail, Seen, confusion, show
+from rgbd_kcf_tracker.view.targets import Targets
+
+SPEEDS = (0.1, 8.0)
+SHOWN_HZ = 20.0
+"""Moments put up each second at most; every frame is tracked all the same."""
+GALLERY = 8
+GALLERY_S = 0.5
+"""Views that are kept of each target, and the least time between two of them."""
+_MOST_COMMANDS = 64
+_IDLE_S = 0.2
+
+Picture = npt.NDArray[np.uint8]
+
+
+@dataclass
+class Passed:
+    """What is remembered of a frame that was tracked.
+
+    Attributes:
+        stamp_ns: of the frame.
+        tracks: by id.
+        entry: its figures for the time line.
+    """
+
+    stamp_ns: int
+    tracks: dict[int, Track]
+    entry: dict[str, Any] = field(default_factory=dict)
+
+
+class Player:
+    """Plays a recording for the page; see :class:`~rgbd_kcf_tracker.view.controller.Controller`.
+
+    Args:
+        recording: of frames; read by this player alone.
+        variant: of the tracker.
+        parameters: of the variant; None for the released defaults.
+        start: the frame shown first.
+        box: the target in it; None to have it picked in the page.
+        detail: of what is sent.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        variant: str,
+        parameters: Parameters | None = None,
+        *,
+        start: int = 0,
+        box: Box | None = None,
+        detail: Detail | None = None,
+    ) -> None:
+        if not 0 <= start < len(recording):
+            raise RecordingError(f'{recording.path} has no frame {start} to show')
+        self.board = Board()
+        self._recording = recording
+        self._variant = variant
+        self._parameters = default_parameters(variant) if parameters is None else parameters
+        self._detail = detail
+        self._first, self._first_box = start, box
+        self._commands: queue.Queue[Command] = queue.Queue(_MOST_COMMANDS)
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+        self._passed: dict[int, Passed] = {}
+        self._targets = Targets(variant, self._parameters)
+        self._names: dict[int, str] = {}
+        self._next_id = 1
+        self._front = start - 1  # the last frame that the trackers have seen
+        self._shown = start
+        self._frame: Frame | None = None
+        self._insights: dict[int, Insight] = {}
+        self._views: dict[int, list[Picture]] = {}
+        self._viewed: dict[int, int] = {}
+        self._reader: Iterator[Frame] | None = None
+        self._next = start
+        self._origin_ns = 0
+        self._playing = False
+        self._speed = 1.0
+        self._due = 0.0
+        self._put_up = 0.0
+        self._word = ''
+        self._busy = ''
+        self._timing: dict[str, float] = {}
+
+    # -- what the page asks -----------------------------------------------------------------------
+
+    def do(self, command: Command) -> None:
+        """Take a request; it is carried out in the player's thread, those beyond reason are not."""
+        try:
+            self._commands.put_nowait(command)
+        except queue.Full:
+            return
+
+    def description(self) -> dict[str, Any]:
+        """What does not change with every moment."""
+        return {
+            'title': self._recording.name,
+            'live': False,
+            'frames': len(self._recording),
+            'variants': describe_variants(),
+            'several': True,
+        }
+
+    def boxes_csv(self) -> str:
+        """All boxes of the run, with ids; a row per frame and target."""
+        out = io.StringIO()
+        out.write(','.join(('id', *HEADER)) + '\n')
+        for number, passed in sorted(self._passed.copy().items()):
+            for key, track in passed.tracks.items():
+                out.write(f'{key},{row(number, passed.stamp_ns, track)}\n')
+        return out.getvalue()
+
+    def parameters_yaml(self) -> str:
+        """The parameters at work."""
+        return yaml_of(self._variant, self._parameters)
+
+    def straight_through(self, end: int) -> Iterator[tuple[int, Seen, dict[str, Any]]]:
+        """Track to the frame before ``end`` in this thread, giving what is seen of each."""
+        self._open()
+        while True:
+            yield self._shown, self._seen(), self._passed[self._shown].entry
+            if self._shown + 1 >= end:
+                return
+            self._go_to(self._shown + 1, show_it=False)
+
+    # -- the thread -------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Begin, in a thread of its own."""
+        self._thread = threading.Thread(target=self.run, name='player', daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(10)
+
+    def run(self) -> None:
+        """Carry out requests and play until :meth:`stop`."""
+        self._guarded(self._open)
+        was_watched = False
+        while not self._stopping.is_set():
+            wait = _IDLE_S
+            if self._playing:
+                wait = min(max(self._due - time.monotonic(), 0.0), _IDLE_S)
+            try:
+                command = self._commands.get(timeout=wait) if wait > 0 else None
+                command = self._commands.get_nowait() if wait <= 0 else command
+                assert command is not None
+                self._guarded(lambda command=command: self._carry_out(command))  # type: ignore[misc]
+            except queue.Empty:
+                pass
+            if self._playing and time.monotonic() >= self._due:
+                self._guarded(self._play_on)
+            if self.board.watched and not was_watched:
+                self._show()
+            was_watched = self.board.watched
+
+    def _guarded(self, action: Any) -> None:
+        """Do it; what cannot be done is said on the page, and nothing ends."""
+        try:
+            action()
+        except RgbdKcfError as error:
+            self._playing = False
+            self._say(str(error))
+
+    def _say(self, word: str) -> None:
+        self._word = word
+        self._show()
+        self._word = ''
+
+    def _open(self) -> None:
+        self._go_to(self._first)
+        if self._first_box is not None:
+            self._add(self._first_box)
+        self._show()
+
+    def _carry_out(self, command: Command) -> None:
+        values = command.values
+        if command.do == 'play':
+            if self._shown >= len(self._recording) - 1:
+                self._go_to(0 if self._first == 0 else self._first)
+            self._playing, self._due = True, time.monotonic()
+        elif command.do == 'pause':
+            self._playing = False
+        elif command.do == 'step':
+            self._playing = False
+            self._go_to(self._shown + max(-1000, min(values['by'], 1000)))
+        elif command.do == 'seek':
+            self._go_to(values['frame'])
+        elif command.do == 'speed':
+            self._speed = min(max(values['value'], SPEEDS[0]), SPEEDS[1])
+        elif command.do == 'box':
+            self._pick(values['frame'], lambda _: Box(*(values[n] for n in _BOX)))
+        elif command.do == 'point':
+            self._pick(values['frame'], lambda frame: surface_at(frame, values['x'], values['y']))
+        elif command.do == 'remove':
+            self._remove(values['id'])
+        elif command.do == 'rename':
+            if values['id'] in self._targets and values['name']:
+                self._names[values['id']] = values['name']
+        elif command.do == 'variant':
+            if values['name'] not in VARIANTS:
+                raise ParameterError(f'unknown variant {values["name"]!r}')
+            self._reconfigure(values['name'], default_parameters(values['name']))
+        elif command.do == 'parameter':
+            self._set(values['name'], values['value'])
+        elif command.do == 'defaults':
+            self._reconfigure(self._variant, default_parameters(self._variant))
+        self._show()
+
+    # -- playing ----------------------------------------------------------------------------------
+
+    def _play_on(self) -> None:
+        if self._shown >= len(self._recording) - 1:
+            self._playing = False
+            self._show()
+            return
+        before = self._passed[self._shown].stamp_ns if self._shown in self._passed else None
+        self._go_to(self._shown + 1, show_it=False)
+        after = self._passed[self._shown].stamp_ns
+        interval = (after - before) * 1e-9 if before is not None else 0.0
+        now = time.monotonic()
+        # What was late is not made up for: the run goes on at its pace.
+        self._due = max(self._due + min(max(interval, 0.0), 5.0) / self._speed, now)
+        if now - self._put_up >= 1 / SHOWN_HZ or self._shown >= len(self._recording) - 1:
+            self._show()
+
+    def _go_to(self, wanted: int, show_it: bool = True) -> None:
+        """Show a frame; those between it and the last one tracked are tracked first."""
+        wanted = min(max(wanted, 0), len(self._recording) - 1)
+        anew = wanted != self._shown + 1
+        if len(self._targets) and wanted > self._front:
+            begun = time.monotonic()
+            for number in range(self._front + 1, wanted + 1):
+                self._track(number, self._read(number))
+                if time.monotonic() - begun > 0.5:
+                    begun = time.monotonic()
+                    self._busy = f'tracking up to frame {wanted}: at {number}'
+                    self._shown = number
+                    self._show()
+                    if self._interrupted():
+                        wanted = number
+                        break
+            self._busy = ''
+            self._shown = wanted
+        else:
+            frame = self._read(wanted)
+            self._shown = wanted
+            self._insights = {}
+            if wanted not in self._passed:
+                self._passed[wanted] = Passed(frame.stamp_ns, {})
+                self._entry(wanted)
+        if anew and show_it:
+            self.board.rewind(self._history())
+        elif self._shown in self._passed:
+            self.board.note(self._passed[self._shown].entry)
+
+    def _interrupted(self) -> bool:
+        return self._stopping.is_set() or not self._commands.empty()
+
+    def _read(self, number: int) -> Frame:
+        begun = time.perf_counter()
+        if self._reader is None or number != self._next:
+            self._reader = iter(self._recording.frames(number))
+        frame = next(self._reader, None)
+        if frame is None:
+            raise RecordingError(f'{self._recording.path} ends before frame {number}')
+        if not self._passed and not self._origin_ns:
+            self._origin_ns = frame.stamp_ns
+        self._next = number + 1
+        self._frame = frame
+        self._timing['read'] = 1000 * (time.perf_counter() - begun)
+        return frame
+
+    def _track(self, number: int, frame: Frame) -> None:
+        begun = time.perf_counter()
+        tracks = self._targets.update(frame)
+        self._timing['track'] = 1000 * (time.perf_counter() - begun)
+        self._insights = dict(self._targets.insights())
+        self._passed[number] = Passed(frame.stamp_ns, tracks)
+        self._front = number
+        self._entry(number)
+        self._keep_views(frame, tracks)
+
+    def _entry(self, number: int) -> None:
+        """The figures of a frame for the time line."""
+        passed = self._passed[number]
+        passed.entry = {
+            't': round((passed.stamp_ns - self._origin_ns) * 1e-9, 4),
+            'frame': number,
+            'targets': [
+                (
+                    key,
+                    track.state.value,
+                    round(float(track.score), 3) if track.score == track.score else 0.0,
+                    round(confusion(track, self._insights.get(key)), 3),
+                )
+                for key, track in passed.tracks.items()
+            ],
+            'read': round(self._timing.get('read', 0.0), 2),
+            'track': round(self._timing.get('track', 0.0), 2),
+            'show': round(self._timing.get('show', 0.0), 2),
+        }
+
+    def _history(self) -> list[dict[str, Any]]:
+        """The figures of the last minute before the frame that is shown."""
+        if self._shown not in self._passed:
+            return []
+        end = self._passed[self._shown].stamp_ns
+        recent = [
+            passed.entry
+            for number, passed in sorted(self._passed.items())
+            if number <= self._shown and passed.stamp_ns >= end - HISTORY_S * 1e9
+        ]
+        return [entry for entry in recent if entry]
+
+    def _keep_views(self, frame: Frame, tracks: dict[int, Track]) -> None:
+        """Keep a picture of each target now and then, the surest ones."""
+        for number, track in tracks.items():
+            views = self._views.setdefault(number, [])
+            late = frame.stamp_ns - self._viewed.get(number, 0) >= GALLERY_S * 1e9
+            if track.box is None or track.score < 0.5 or not late:
+                continue
+            view = _view(frame, track.box)
+            if view is not None:
+                self._viewed[number] = frame.stamp_ns
+                # The first stays; of the others the newest.
+                views[1:] = views[-(GALLERY - 2) :] if len(views) >= GALLERY else views[1:]
+                views.append(view)
+
+    # -- targets and parameters -------------------------------------------------------------------
+
+    def _pick(self, number: int, box_in: Any) -> None:
+        """Follow what is in a box of the frame that the browser showed."""
+        if number != self._shown or self._frame is None:
+            self._go_to(number)
+        assert self._frame is not None
+        self._add(box_in(self._frame))
+
+    def _add(self, box: Box) -> None:
+        assert self._frame is not None
+        if self._shown < self._front:
+            self._again(self._shown)
+        key = self._next_id
+        track = self._targets.add(key, self._frame, box)
+        self._next_id += 1
+        self._names[key] = f'target {key}'
+        self._forget_after(self._shown)
+        passed = self._passed.setdefault(self._shown, Passed(self._frame.stamp_ns, {}))
+        passed.tracks[key] = track
+        self._front = self._shown
+        self._entry(self._shown)
+        self._viewed[key] = 0
+        self._keep_views(self._frame, {key: track})
+        self.board.rewind(self._history())
+
+    def _remove(self, key: int) -> None:
+        if key not in self._targets:
+            return
+        if self._shown < self._front:
+            self._again(self._shown)
+        self._targets.remove(key)
+        self._insights.pop(key, None)
+        self._views.pop(key, None)
+        self._forget_after(self._shown)
+        if self._shown in self._passed:
+            self._passed[self._shown].tracks.pop(key, None)
+            self._entry(self._shown)
+        self.board.rewind(self._history())
+
+    def _forget_after(self, number: int) -> None:
+        for later in [n for n in self._passed if n > number]:
+            del self._passed[later]
+
+    def _set(self, name: str, value: Any) -> None:
+        info = next((i for i in describe(type(self._parameters)) if i.name == name), None)
+        if info is None:
+            raise ParameterError(f'{self._variant} has no parameter {name!r}')
+        self._reconfigure(self._variant, self._parameters.replace(**{name: checked(info, value)}))
+
+    def _reconfigure(self, variant: str, parameters: Parameters) -> None:
+        """Go on from the frame that is shown with another tracker, or others of its parameters."""
+        self._variant, self._parameters = variant, parameters
+        self._again(self._shown)
+
+    def _again(self, number: int) -> None:
+        """Trackers that stand at a frame: each starts where its target was last seen up to it."""
+        keys = list(self._passed[number].tracks) if number in self._passed else []
+        starts: dict[int, int] = {}
+        for key in keys:
+            for earlier in range(number, -1, -1):
+                passed = self._passed.get(earlier)
+                if passed is None or key not in passed.tracks:
+                    break
+                if passed.tracks[key].box is not None:
+                    starts[key] = earlier
+                    break
+        self._targets = Targets(self._variant, self._parameters)
+        self._forget_after(number)
+        if starts:
+            for at in range(min(starts.values()), number + 1):
+                frame = self._read(at)
+                tracks = self._targets.update(frame)
+                for key, begin in starts.items():
+                    box = self._passed[at].tracks[key].box if begin == at else None
+                    if box is not None:
+                        tracks[key] = self._targets.add(key, frame, box)
+                self._passed[at].tracks.update(tracks)
+        self._insights = dict(self._targets.insights())
+        self._front = number
+        if number in self._passed:
+            self._entry(number)
+        self.board.rewind(self._history())
+
+    # -- showing ----------------------------------------------------------------------------------
+
+    def _show(self) -> None:
+        if self._frame is None or not self.board.watched:
+            return
+        begun = time.perf_counter()
+        header, blobs = show(self._seen(), self._detail)
+        self.board.show(header, blobs)
+        self._put_up = time.monotonic()
+        self._timing['show'] = 1000 * (time.perf_counter() - begun)
+
+    def _seen(self) -> Seen:
+        assert self._frame is not None
+        passed = self._passed.get(self._shown)
+        truth = self._recording.groundtruth
+        known = truth is not None and self._shown < len(truth)
+        current = self._insights if self._shown == self._front else {}
+        return Seen(
+            self._frame,
+            passed.tracks if passed is not None else {},
+            self._names,
+            current,
+            self._views,
+            truth[self._shown] if truth is not None and known else None,
+            {
+                'frame': self._shown,
+                'stamp_ns': str(self._frame.stamp_ns),
+                'time': round((self._frame.stamp_ns - self._origin_ns) * 1e-9, 3),
+                'front': self._front,
+                'playing': self._playing,
+                'speed': self._speed,
+                'busy': self._busy,
+                'word': self._word,
+                'variant': self._variant,
+                'values': {
+                    i.name: getattr(self._parameters, i.name)
+                    for i in describe(type(self._parameters))
+                },
+            },
+        )
+
+
+_BOX = ('x', 'y', 'width', 'height')
+
+
+def _view(frame: Frame, box: Box) -> Picture | None:
+    import cv2
+
+    inside = box.clipped(frame.width, frame.height)
+    if inside is None or inside.width < 2 or inside.height < 2:
+        return None
+    left, top = int(inside.x), int(inside.y)
+    part = frame.color[top : int(inside.bottom), left : int(inside.right)]
+    width = max(1, round(part.shape[1] * GALLERY_HEIGHT / part.shape[0]))
+    size = (min(width, 2 * GALLERY_HEIGHT), GALLERY_HEIGHT)
+    view: Picture = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    return view

@@ -1,0 +1,366 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The page over HTTP and a WebSocket, and who may see it.
+
+On a loopback address the machine's own users may; a request is answered only where it was sent to
+that address by name, so that no other site can reach the page through a browser (DNS rebinding),
+and a socket is opened only for the page itself (its origin). On any other address a token is asked
+for before anything is shown.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import ipaddress
+import logging
+import secrets
+import socket
+import threading
+from collections.abc import Awaitable, Callable, Iterator
+from importlib import resources
+from urllib.parse import urlsplit
+
+from aiohttp import WSMsgType, web
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.view.commands import LARGEST_MESSAGE, parse
+from rgbd_kcf_tracker.view.controller import Controller
+from rgbd_kcf_tracker.view.showing import pack
+
+LOOPBACK = ('127.0.0.1', 'localhost', '::1')
+MOST_BROWSERS = 16
+SHORTEST_TOKEN = 8
+WRONG_TOKEN_S = 1.0
+"""Wait after a wrong token; they are answered one at a time, so guessing is slow for everybody."""
+COMMANDS_S = 60
+"""Requests that one browser may make each second; beyond, its socket is closed."""
+ACK_S = 10.0
+"""Longest wait for a browser to have drawn a moment; one that sleeps longer is let go."""
+COOKIE = 'rgbd_kcf_view'
+STATIC = ('page.css', 'page.js', 'draw.js', 'room.js')
+
+_HEADERS = {
+    'Content-Security-Policy': (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+        "connect-src 'self'; form-action 'self'; frame-ancestors 'none'; base-uri 'none'"
+    ),
+    'X-Content-Type-Options': 'nosniff',
+    'Referrer-Policy': 'same-origin',  # with none a form would name no origin
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Cache-Control': 'no-store',
+}
+_TYPES = {'.css': 'text/css', '.js': 'text/javascript', '.html': 'text/html'}
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == 'localhost':
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def static_file(name: str) -> bytes:
+    """One of the page's files."""
+    return resources.files('rgbd_kcf_tracker.view').joinpath('static').joinpath(name).read_bytes()
+
+
+class Server:
+    """Serves the page of a controller, in a thread of its own.
+
+    Args:
+        controller: what stands behind it.
+        host: address to listen on.
+        port: TCP port; 0 for any that is free.
+        token: asked for before anything is shown; needed on every address but a loopback one.
+
+    Attributes:
+        url: where the page is, once :meth:`start` has returned.
+
+    Raises:
+        ParameterError: for an address that is no loopback one without a token, or a short token.
+    """
+
+    def __init__(
+        self, controller: Controller, host: str = '127.0.0.1', port: int = 8080, token: str = ''
+    ) -> None:
+        if not token and not is_loopback(host):
+            raise ParameterError(
+                f'{host} is reachable from other machines: give a token (--token), or listen on '
+                '127.0.0.1 and reach it through an SSH tunnel (ssh -L 8080:127.0.0.1:8080 HOST)'
+            )
+        if token and len(token) < SHORTEST_TOKEN:
+            raise ParameterError(f'the token is too short: give at least {SHORTEST_TOKEN} signs')
+        self._controller, self._board = controller, controller.board
+        self._host, self._port, self._token = host, port, token
+        # What is kept in the browser is not the token itself, and ends with this server.
+        self._session = secrets.token_urlsafe(32)
+        self._loop = asyncio.new_event_loop()
+        self._thread: threading.Thread | None = None
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._wrong = asyncio.Lock()
+        self.url = ''
+
+    # -- life -------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Listen, and return when the page can be asked for.
+
+        Raises:
+            ParameterError: where the address cannot be listened on.
+        """
+        listening = _bound(self._host, self._port)
+        host, port = listening.getsockname()[:2]
+        shown = 'localhost' if host in ('0.0.0.0', '::') else host
+        self.url = f'http://{f"[{shown}]" if ":" in shown else shown}:{port}/'
+        ready = threading.Event()
+        self._thread = threading.Thread(
+            target=self._run, args=(listening, ready), name='viewer', daemon=True
+        )
+        self._thread.start()
+        ready.wait(10)
+
+    def stop(self) -> None:
+        """Close all sockets and end the thread."""
+        if self._thread is None or not self._loop.is_running():
+            return
+        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result(10)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(10)
+
+    def _run(self, listening: socket.socket, ready: threading.Event) -> None:
+        asyncio.set_event_loop(self._loop)
+        logging.getLogger('aiohttp.server').setLevel(logging.CRITICAL)
+        self._loop.run_until_complete(self._open(listening))
+        ready.set()
+        try:
+            self._loop.run_forever()
+        finally:
+            self._loop.close()
+
+    async def _open(self, listening: socket.socket) -> None:
+        @web.middleware
+        async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+            return await self._guard(request, handler)
+
+        app = web.Application(middlewares=[guard], client_max_size=LARGEST_MESSAGE)
+        app.add_routes(
+            [
+                web.get('/', self._page),
+                web.post('/login', self._login),
+                web.get('/socket', self._socket),
+                web.get('/boxes.csv', self._csv),
+                web.get('/parameters.yaml', self._yaml),
+                *(web.get(f'/{name}', self._static) for name in STATIC),
+            ]
+        )
+        # A browser that only opens connections must not hold them for ever.
+        self._runner = web.AppRunner(app, access_log=None, keepalive_timeout=15)
+        await self._runner.setup()
+        await web.SockSite(self._runner, listening).start()
+
+    async def _close(self) -> None:
+        for connected in list(self._sockets):
+            with contextlib.suppress(Exception):
+                await asyncio.wait_for(connected.close(), 1)
+        await self._runner.cleanup()
+
+    # -- who may ----------------------------------------------------------------------------------
+
+    async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Every request passes here before anything else is done with it."""
+        refusal = self._refusal(request)
+        if refusal is not None:
+            response: web.StreamResponse = web.Response(status=403, text=refusal)
+        elif not self._known(request) and request.path != '/login':
+            # Styles are no secret, and the form should not be ugly.
+            if request.path == '/page.css':
+                response = await handler(request)
+            elif request.path == '/':
+                response = _html(_form(''), 401)
+            else:
+                response = web.Response(status=401, text='a token is needed: open the page first')
+        else:
+            try:
+                response = await handler(request)
+            except web.HTTPException as error:
+                response = web.Response(status=error.status, text=error.reason)
+        if not response.prepared:
+            response.headers.update(_HEADERS)
+        return response
+
+    def _refusal(self, request: web.Request) -> str | None:
+        host = request.headers.get('Host', '')
+        name = urlsplit(f'//{host}').hostname or ''
+        if not self._token and name not in LOOPBACK and not is_loopback(name):
+            return f'this viewer answers to 127.0.0.1 and localhost alone, not to {name[:80]!r}'
+        origin = request.headers.get('Origin')
+        # Every browser names the origin of a socket and of a form.
+        if origin is None:
+            needed = request.path in ('/socket', '/login')
+            return 'no origin is named' if needed else None
+        parts = urlsplit(origin)
+        if parts.scheme not in ('http', 'https') or parts.netloc != host:
+            return f'the page of {origin[:80]!r} may not use this viewer'
+        return None
+
+    def _known(self, request: web.Request) -> bool:
+        if not self._token:
+            return True
+        return hmac.compare_digest(request.cookies.get(COOKIE, '').encode(), self._session.encode())
+
+    async def _login(self, request: web.Request) -> web.StreamResponse:
+        form = await request.post()
+        given = form.get('token')
+        said = given if isinstance(given, str) else ''
+        if not self._token or hmac.compare_digest(said.encode(), self._token.encode()):
+            response = web.Response(status=303, headers={'Location': '/'})
+            response.set_cookie(
+                COOKIE, self._session, httponly=True, samesite='Strict', path='/',
+                secure=request.secure,
+            )  # fmt: skip
+            return response
+        async with self._wrong:
+            await asyncio.sleep(WRONG_TOKEN_S)
+        return _html(_form('That is not the token.'), 401)
+
+    # -- what is there ----------------------------------------------------------------------------
+
+    async def _page(self, _: web.Request) -> web.StreamResponse:
+        return _html(static_file('page.html').decode())
+
+    async def _static(self, request: web.Request) -> web.StreamResponse:
+        name = request.path.lstrip('/')
+        kind = _TYPES['.' + name.rpartition('.')[2]]
+        return web.Response(body=static_file(name), content_type=kind, charset='utf-8')
+
+    async def _csv(self, _: web.Request) -> web.StreamResponse:
+        return _download('boxes.csv', 'text/csv', self._controller.boxes_csv())
+
+    async def _yaml(self, _: web.Request) -> web.StreamResponse:
+        return _download('parameters.yaml', 'text/yaml', self._controller.parameters_yaml())
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        if len(self._sockets) >= MOST_BROWSERS:
+            return web.Response(status=503, text=f'{MOST_BROWSERS} browsers look already')
+        connected = web.WebSocketResponse(
+            max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False
+        )
+        self._sockets.add(connected)
+        try:
+            await connected.prepare(request)
+            await self._converse(connected)
+        finally:
+            self._sockets.discard(connected)
+        return connected
+
+    async def _converse(self, connected: web.WebSocketResponse) -> None:
+        news, drawn = asyncio.Event(), asyncio.Event()
+        wake = _waker(self._loop, news)
+        self._board.watch(wake)
+        sender = asyncio.ensure_future(self._send(connected, news, drawn))
+        try:
+            await self._receive(connected, drawn)
+        finally:
+            self._board.unwatch(wake)
+            sender.cancel()
+            with contextlib.suppress(asyncio.CancelledError, ConnectionError):
+                await sender
+
+    async def _send(
+        self, connected: web.WebSocketResponse, news: asyncio.Event, drawn: asyncio.Event
+    ) -> None:
+        """Send the newest moment, and the next only when that one is drawn."""
+        await connected.send_json({'hello': self._controller.description()})
+        number, since = 0, (-1, 0)
+        while not connected.closed:
+            if self._board.newer(number) is None:
+                await news.wait()
+                news.clear()
+                continue
+            number, since, header, blobs = self._board.take(since)
+            drawn.clear()
+            try:
+                await connected.send_bytes(pack(header, blobs))
+                await asyncio.wait_for(drawn.wait(), ACK_S)
+            except (asyncio.TimeoutError, ConnectionError):
+                await connected.close(code=1013, message=b'too slow')
+                return
+
+    async def _receive(self, connected: web.WebSocketResponse, drawn: asyncio.Event) -> None:
+        begun, count = self._loop.time(), 0
+        async for message in connected:
+            if message.type is not WSMsgType.TEXT:
+                await connected.close(code=1003, message=b'only text is understood')
+                return
+            if self._loop.time() - begun > 1:
+                begun, count = self._loop.time(), 0
+            count += 1
+            if count > COMMANDS_S:
+                await connected.close(code=1008, message=b'too many requests')
+                return
+            try:
+                command = parse(message.data)
+            except ParameterError as error:
+                await connected.send_json({'refused': str(error)})
+                continue
+            if command.do == 'ack':
+                drawn.set()
+            else:
+                self._controller.do(command)
+
+
+def _waker(loop: asyncio.AbstractEventLoop, news: asyncio.Event) -> Callable[[], None]:
+    def wake() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            loop.call_soon_threadsafe(news.set)
+
+    return wake
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family = socket.AF_INET6 if ':' in host else socket.AF_INET
+        listening = socket.socket(family, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind((host, port))
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, 'strerror', None) or error
+        raise ParameterError(
+            f'{host}:{port} cannot be listened on: {reason}; name another --port'
+        ) from None
+    return listening
+
+
+def _html(text: str, status: int = 200) -> web.Response:
+    return web.Response(text=text, content_type='text/html', status=status)
+
+
+def _download(name: str, kind: str, text: str) -> web.Response:
+    return web.Response(
+        text=text,
+        content_type=kind,
+        headers={'Content-Disposition': f'attachment; filename="{name}"'},
+    )
+
+
+def _form(problem: str) -> str:
+    note = f'<p role="alert">{problem}</p>' if problem else ''
+    return static_file('token.html').decode().replace('<!-- problem -->', note)
+
+
+@contextlib.contextmanager
+def serving(controller: Controller, host: str, port: int, token: str) -> Iterator[Server]:
+    """A server that is started, and stopped at the end of the block."""
+    server = Server(controller, host, port, token)
+    server.start()
+    try:
+        yield server
+    finally:
+        server.stop()

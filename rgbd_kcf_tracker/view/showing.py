@@ -1,0 +1,254 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""One moment as the page shows it: a few kilobytes of JSON and the pictures as bytes.
+
+Made only while somebody looks, and off the tracker's process where it runs live.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.track import Track, TrackState
+from rgbd_kcf_tracker.view.insight import Insight
+
+QUALITY = 80
+MOST_PARTICLES = 300
+MOST_CONSIDERED = 6
+DEEPEST_M = 30.0
+"""Points beyond are not drawn: nearer ones fit the wire's 16 bits of millimetres."""
+_NO_DEPTH = (224, 219, 216)
+# Of two independent normal variables, 95 % lie within sqrt(-2 ln 0.05) deviations.
+_HOLDS_95 = 2.4477
+_STRANGER_AT = 0.02
+GALLERY_HEIGHT = 96
+
+
+@dataclass(frozen=True, slots=True)
+class Detail:
+    """How much of a moment is sent.
+
+    Attributes:
+        width: of the pictures in pixels, at most.
+        points: of the room, at most.
+        quality: of the JPEG files, 1 to 100.
+    """
+
+    width: int = 960
+    points: int = 12000
+    quality: int = QUALITY
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What there is to show of one moment.
+
+    Attributes:
+        frame: the images.
+        tracks: answers by id.
+        names: of the targets.
+        insights: what each tracker knows.
+        views: pictures by which each target is known, BGR, oldest first.
+        truth: the true box where known.
+        status: what else the page shows: numbers, words.
+    """
+
+    frame: Frame
+    tracks: Mapping[int, Track] = field(default_factory=dict)
+    names: Mapping[int, str] = field(default_factory=dict)
+    insights: Mapping[int, Insight] = field(default_factory=dict)
+    views: Mapping[int, list[npt.NDArray[np.uint8]]] = field(default_factory=dict)
+    truth: Box | None = None
+    status: Mapping[str, Any] = field(default_factory=dict)
+
+
+def pack(header: Mapping[str, Any], blobs: Mapping[str, bytes]) -> bytes:
+    """A message: the length of the JSON, the JSON, the blobs that it places by offset and length.
+
+    Offsets count from the end of the JSON, which is padded so that they are multiples of 8.
+    """
+    places, parts, offset = {}, [], 0
+    for name, blob in blobs.items():
+        places[name] = (offset, len(blob))
+        padding = -len(blob) % 8
+        parts += [blob, b'\0' * padding]
+        offset += len(blob) + padding
+    text = json.dumps({**header, 'blobs': places}, separators=(',', ':'), allow_nan=False).encode()
+    text += b' ' * (-(len(text) + 4) % 8)
+    return b''.join((struct.pack('<I', len(text)), text, *parts))
+
+
+def show(seen: Seen, detail: Detail | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
+    """The JSON and the blobs of a moment."""
+    detail = Detail() if detail is None else detail
+    frame = seen.frame
+    k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
+    header: dict[str, Any] = {
+        'size': (frame.width, frame.height),
+        'camera': (k.fx, k.fy, k.cx, k.cy),
+        'guessed': frame.intrinsics is None,
+        'targets': [
+            _target(number, track, seen.names.get(number, ''), seen.insights.get(number))
+            for number, track in seen.tracks.items()
+        ],
+        'truth': _corners(seen.truth),
+        **seen.status,
+    }
+    insight = next(iter(seen.insights.values()), Insight())
+    header['floor'] = _floor(insight, k)
+    blobs = {'color': _jpeg(frame.color, detail)}
+    if frame.depth is not None:
+        picture, far = depth_picture(frame.depth, detail.width)
+        blobs['depth'] = _encoded(picture, detail.quality)
+        header['far'] = far
+        blobs['points'] = room_points(frame, k, detail.points)
+    for number, pictures in seen.views.items():
+        for index, picture in enumerate(pictures):
+            blobs[f'view_{number}_{index}'] = _encoded(picture, detail.quality)
+    return header, blobs
+
+
+def _target(number: int, track: Track, name: str, insight: Insight | None) -> dict[str, Any]:
+    target: dict[str, Any] = {
+        'id': number,
+        'name': name or f'target {number}',
+        'state': track.state.value,
+        'score': round(float(track.score), 4) if track.score == track.score else None,
+        'box': _corners(track.box),
+        'depth': None if track.depth is None else round(track.depth, 3),
+        'position': None if track.position is None else [round(v, 3) for v in track.position],
+    }
+    if insight is None:
+        return target
+    target['considered'] = [
+        {
+            'box': _corners(c.box),
+            'probability': round(c.probability, 4),
+            'cues': {name: round(value, 2) for name, value in c.cues.items()},
+        }
+        for c in insight.considered[:MOST_CONSIDERED]
+    ]
+    hidden = track.state is not TrackState.TRACKING
+    if insight.particles is not None and insight.weights is not None and hidden:
+        target['particles'] = _particles(insight.particles, insight.weights)
+        target['ellipse'] = ellipse(insight.particles, insight.weights)
+    if insight.particle_pixels is not None and insight.weights is not None:
+        target['pixels'] = _particles(insight.particle_pixels, insight.weights, 1)
+    return target
+
+
+def confusion(track: Track, insight: Insight | None) -> float:
+    """The probability of the likeliest candidate that was not taken, 0 where there is none."""
+    if insight is None:
+        return 0.0
+    others = [
+        c.probability
+        for c in insight.considered
+        if track.box is None or c.box.iou(track.box) < _STRANGER_AT
+    ]
+    return max(others, default=0.0)
+
+
+def _corners(box: Box | None) -> list[float] | None:
+    return None if box is None else [round(v, 2) for v in box.as_tuple()]
+
+
+def _particles(places: npt.NDArray[Any], weights: npt.NDArray[Any], digits: int = 2) -> Any:
+    step = max(1, -(-len(places) // MOST_PARTICLES))
+    heaviest = float(weights.max()) or 1.0
+    shares = (weights[::step] / heaviest).round(2)
+    return np.column_stack((places[::step].round(digits), shares)).tolist()
+
+
+def ellipse(particles: npt.NDArray[Any], weights: npt.NDArray[Any]) -> list[float]:
+    """The ellipse from above that holds 95 % of a normal spread: x, z, both half axes, angle.
+
+    Metres and radians, the angle from x towards z.
+    """
+    places = particles[:, [0, 2]]
+    mean = weights @ places
+    away = places - mean
+    spread = (weights[:, None] * away).T @ away
+    values, vectors = np.linalg.eigh(spread)
+    major, minor = (_HOLDS_95 * float(np.sqrt(max(v, 0.0))) for v in (values[1], values[0]))
+    angle = float(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    return [round(v, 3) for v in (float(mean[0]), float(mean[1]), major, minor, angle)]
+
+
+def _floor(insight: Insight, k: Intrinsics) -> list[float] | None:
+    """The floor as ``a x + b y + c z = 1`` in metres of the camera's frame."""
+    if insight.floor is None:
+        return None
+    a, b, c = insight.floor
+    step = insight.step
+    # 1/z = a u + b v + c with u = (fx x / z + cx) / step, so multiplied by z:
+    across, down = a * k.fx / step, b * k.fy / step
+    ahead = c + a * k.cx / step + b * k.cy / step
+    return [round(v, 5) for v in (across, down, ahead)]
+
+
+def _scaled(image: npt.NDArray[Any], width: int, how: int) -> npt.NDArray[Any]:
+    if image.shape[1] <= width:
+        return image
+    height = max(1, round(image.shape[0] * width / image.shape[1]))
+    scaled: npt.NDArray[Any] = cv2.resize(image, (width, height), interpolation=how)
+    return scaled
+
+
+def _jpeg(image: npt.NDArray[np.uint8], detail: Detail) -> bytes:
+    return _encoded(_scaled(image, detail.width, cv2.INTER_AREA), detail.quality)
+
+
+def _encoded(image: npt.NDArray[Any], quality: int) -> bytes:
+    data = cv2.imencode('.jpg', image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    encoded: bytes = data.tobytes()
+    return encoded
+
+
+def depth_picture(
+    depth: npt.NDArray[np.float32], width: int
+) -> tuple[npt.NDArray[np.uint8], float]:
+    """Depth in a map whose lightness grows with the distance, and the distance of its bright end.
+
+    Returns:
+        ``(h, w, 3)`` uint8 BGR, light grey where there is no reading, and metres.
+    """
+    small = _scaled(depth, width, cv2.INTER_NEAREST)
+    valid = np.isfinite(small) & (small > 0)
+    some = small[::8, ::8][valid[::8, ::8]]
+    # Whole metres, so that colours do not flicker with every frame.
+    far = float(np.ceil(np.quantile(some, 0.95))) if some.size else 1.0
+    level = np.where(valid, np.clip(small / far, 0, 1) * 255, 0).astype(np.uint8)
+    picture: npt.NDArray[np.uint8] = cv2.applyColorMap(level, cv2.COLORMAP_CIVIDIS)
+    picture[~valid] = _NO_DEPTH
+    return picture, far
+
+
+def room_points(frame: Frame, k: Intrinsics, most: int) -> bytes:
+    """Points of the room, thinned evenly over the image.
+
+    Returns:
+        ``3 n`` int16 of millimetres in the camera's frame, then ``3 n`` uint8 of RGB.
+    """
+    assert frame.depth is not None
+    step = max(1, int(np.ceil(np.sqrt(frame.width * frame.height / most))))
+    z = frame.depth[step // 2 :: step, step // 2 :: step]
+    rows, cols = np.nonzero((z > 0) & (z < DEEPEST_M))
+    depth = z[rows, cols]
+    v, u = rows * step + step // 2, cols * step + step // 2
+    places = np.stack(((u - k.cx) * depth / k.fx, (v - k.cy) * depth / k.fy, depth), axis=1)
+    millimetres = np.clip(places * 1000, -32000, 32000).astype('<i2')
+    colors = frame.color[v, u, ::-1]
+    packed: bytes = millimetres.tobytes() + np.ascontiguousarray(colors).tobytes()
+    return packed

@@ -1,0 +1,433 @@
+// Copyright 2026 The rgbd_kcf_tracker authors
+// SPDX-License-Identifier: Apache-2.0
+
+// The page: what comes over the socket (or lies in the file) is shown, what is asked goes back.
+'use strict';
+
+const $ = id => document.getElementById(id);
+const stored = $('stored');
+const page = {
+  hello: null, shown: null, entries: [], trails: new Map(), points: null, bitmaps: {}, drag: null,
+  socket: null, wait: 500, views: new Map(), settings: '', timeAxis: null, drawn: 0, word: 0,
+};
+const room = new Room($('room'), $('labels'), stored ? null : (x, y) => send({do: 'point', x, y, frame: currentFrame()}));
+
+// --- what comes -----------------------------------------------------------------------------------
+
+function unpack(buffer) {
+  const length = new DataView(buffer).getUint32(0, true);
+  const shown = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  const blob = name => {
+    const place = shown.blobs[name];
+    return place ? new Uint8Array(buffer, 4 + length + place[0], place[1]) : null;
+  };
+  return [shown, blob];
+}
+
+async function bitmapOf(bytes) {
+  return bytes ? createImageBitmap(new Blob([bytes], {type: 'image/jpeg'})) : null;
+}
+
+function pointsOf(bytes) {
+  if (!bytes) return null;
+  const count = bytes.length / 9;
+  return {
+    count,
+    places: new Int16Array(bytes.buffer, bytes.byteOffset, 3 * count),
+    tints: new Uint8Array(bytes.buffer, bytes.byteOffset + 6 * count, 3 * count),
+  };
+}
+
+async function show(buffer) {
+  const [shown, blob] = unpack(buffer);
+  const [color, depth] = await Promise.all([bitmapOf(blob('color')), bitmapOf(blob('depth'))]);
+  for (const old of Object.values(page.bitmaps)) if (old) old.close();
+  page.bitmaps = {color, depth};
+  page.points = pointsOf(blob('points'));
+  if (shown.anew) { page.entries = []; page.trails.clear(); }
+  page.entries.push(...shown.entries);
+  const last = page.entries.length ? page.entries[page.entries.length - 1].t : 0;
+  page.entries = page.entries.filter(e => e.t >= last - 60);
+  page.shown = shown;
+  for (const target of shown.targets) {
+    const trail = page.trails.get(target.id) || [];
+    if (target.position) trail.push({t: shown.time, place: target.position});
+    page.trails.set(target.id, trail.filter(p => p.t > shown.time - TRAIL_S && p.t <= shown.time));
+  }
+  showViews(shown, blob);
+  redraw();
+  page.drawn += 1;
+}
+
+function redraw() {
+  const shown = page.shown;
+  if (!shown) return;
+  drawPicture($('picture'), page.bitmaps.color, shown, page.drag);
+  drawDepth($('depth'), page.bitmaps.depth, shown);
+  $('far').textContent = shown.far ? `dark 0 m, bright ${shown.far} m` : '';
+  drawAbove($('above'), shown, page.points, page.trails);
+  page.timeAxis = drawTime($('time'), page.entries, shown.time);
+  room.show(shown, page.points, page.trails);
+  showWords(shown);
+  showTargets(shown);
+  showWhy(shown);
+  showSettings(shown);
+}
+
+function showWords(shown) {
+  const states = shown.targets.map(t => t.state);
+  const worst = ['lost', 'occluded', 'tracking'].find(s => states.includes(s)) || 'idle';
+  $('state').dataset.state = worst;
+  $('state').textContent = {tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'no target'}[worst];
+  const recent = page.entries.slice(-30);
+  const mean = name => recent.reduce((sum, e) => sum + (e[name] || 0), 0) / Math.max(1, recent.length);
+  const facts = [];
+  if (recent.length > 1) {
+    const span = recent[recent.length - 1].t - recent[0].t;
+    if (span > 0) facts.push(`${((recent.length - 1) / span).toFixed(1)} frames/s`);
+  }
+  if (mean('track')) facts.push(`tracking ${mean('track').toFixed(1)} ms`);
+  if (shown.latency) facts.push(`latency ${shown.latency} ms`);
+  if (shown.dropped !== undefined) facts.push(`${shown.dropped} pairs dropped`);
+  if (shown.guessed && shown.blobs.points) facts.push('camera unknown: metres are guessed');
+  $('numbers').textContent = facts.join(' · ');
+  if (shown.word) say(shown.word, 8000);
+  else if (shown.busy) say(shown.busy, 1500);
+  if (page.hello && !page.hello.live) {
+    $('seek').max = page.hello.frames - 1;
+    if (document.activeElement !== $('seek') || shown.playing) $('seek').value = shown.frame;
+    $('frame').textContent = `${shown.frame} / ${page.hello.frames - 1}`;
+    $('play').textContent = shown.playing ? 'Pause' : 'Play';
+    if (document.activeElement !== $('speed')) $('speed').value = String(shown.speed);
+  }
+}
+
+function say(words, milliseconds) {
+  $('banner').textContent = words;
+  $('banner').hidden = false;
+  clearTimeout(page.word);
+  if (milliseconds) page.word = setTimeout(() => { $('banner').hidden = true; }, milliseconds);
+}
+
+function make(tag, className, words) {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  if (words !== undefined) element.textContent = words;
+  return element;
+}
+
+function showTargets(shown) {
+  $('no-targets').hidden = shown.targets.length > 0;
+  const list = $('targets');
+  const known = new Map([...list.children].map(li => [Number(li.dataset.id), li]));
+  for (const target of shown.targets) {
+    let item = known.get(target.id);
+    known.delete(target.id);
+    if (!item) {
+      item = make('li');
+      item.dataset.id = target.id;
+      const name = make('input');
+      name.maxLength = 40;
+      name.setAttribute('aria-label', 'name');
+      name.readOnly = Boolean(stored) || !page.hello.several;
+      name.addEventListener('change', () => send({do: 'rename', id: target.id, name: name.value}));
+      const remove = make('button', 'only-online', 'Remove');
+      remove.type = 'button';
+      remove.addEventListener('click', () => send({do: 'remove', id: target.id}));
+      item.append(make('span', 'dot'), name, remove, make('span', 'facts'), make('div', 'views'));
+      list.append(item);
+    }
+    const [dot, name, , facts] = item.children;
+    dot.dataset.state = target.state;
+    dot.style.outline = `3px solid ${colorOf(target.id)}`;
+    if (document.activeElement !== name) name.value = target.name;
+    const words = [{tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'idle'}[target.state]];
+    if (target.box && target.score !== null) words.push(`score ${target.score.toFixed(2)}`);
+    if (target.depth !== null) words.push(`${target.depth.toFixed(2)} m`);
+    facts.textContent = words.join(' · ');
+    const views = item.children[4];
+    const urls = page.views.get(target.id) || [];
+    if (views.dataset.urls !== urls.join()) {
+      views.dataset.urls = urls.join();
+      views.replaceChildren(...urls.map(url => { const image = make('img'); image.src = url; image.alt = `a view of ${target.name}`; return image; }));
+    }
+  }
+  for (const gone of known.values()) gone.remove();
+}
+
+function showViews(shown, blob) {
+  const found = new Map();
+  for (const name of Object.keys(shown.blobs)) {
+    const match = /^view_(\d+)_(\d+)$/.exec(name);
+    if (match) found.set(Number(match[1]), [...(found.get(Number(match[1])) || []), name]);
+  }
+  for (const [id, names] of found) {
+    const sizes = names.map(name => shown.blobs[name][1]).join();
+    const before = page.views.get(id);
+    if (before && before.sizes === sizes) continue;
+    for (const url of before || []) URL.revokeObjectURL(url);
+    const urls = names.map(name => URL.createObjectURL(new Blob([blob(name)], {type: 'image/jpeg'})));
+    urls.sizes = sizes;
+    page.views.set(id, urls);
+  }
+}
+
+function showWhy(shown) {
+  const target = shown.targets.find(t => t.considered && t.considered.length);
+  $('no-why').hidden = Boolean(target);
+  $('why-of').textContent = target ? target.name : '';
+  const cards = (target ? target.considered : []).slice(0, 4).map((candidate, index) => {
+    const card = make('div', 'candidate');
+    const odds = Object.values(candidate.cues).reduce((sum, v) => sum + v, 0);
+    const first = index === 0 && target.box;
+    card.append(make('b', '', `${Math.round(100 * candidate.probability)} %`), make('span', 'quiet',
+      `  ${first ? 'taken' : 'not taken'}, log-odds ${odds >= 0 ? '+' : '−'}${Math.abs(odds).toFixed(1)}, at ${candidate.box.map(v => Math.round(v)).join(', ')}`));
+    for (const [name, value] of Object.entries(candidate.cues)) {
+      if (Math.abs(value) < 0.05) continue;
+      const row = make('div', 'cue');
+      const bar = make('div', 'bar'), fill = make('i', value < 0 ? 'against' : '');
+      const share = Math.min(50, Math.abs(value) * 6);
+      fill.style.width = `${share}%`;
+      fill.style.left = value < 0 ? `${50 - share}%` : '50%';
+      bar.append(fill);
+      row.append(make('span', '', name), bar, make('span', '', `${value >= 0 ? '+' : '−'}${Math.abs(value).toFixed(1)}`));
+      card.append(row);
+    }
+    return card;
+  });
+  $('why').replaceChildren(...cards);
+}
+
+function showSettings(shown) {
+  const variant = page.hello && page.hello.variants.find(v => v.name === shown.variant);
+  if (!variant) return;
+  if (document.activeElement !== $('variant')) $('variant').value = variant.name;
+  $('summary').textContent = variant.summary;
+  if (page.settings !== variant.name) {
+    page.settings = variant.name;
+    $('parameters').replaceChildren(...variant.parameters.map(parameterRow));
+  }
+  for (const row of $('parameters').children) {
+    const value = (shown.values || {})[row.dataset.name];
+    const input = row.querySelector('input, select');
+    if (value === undefined || document.activeElement === input) continue;
+    if (input.type === 'checkbox') input.checked = value; else input.value = value;
+    row.classList.toggle('changed', String(value) !== row.dataset.initial);
+  }
+}
+
+function parameterRow(info) {
+  const row = make('div', 'parameter');
+  row.dataset.name = info.name;
+  row.dataset.initial = String(info.default);
+  const name = make('label', '', info.name + (info.unit ? ` (${info.unit})` : ''));
+  let input = make(info.choices.length ? 'select' : 'input');
+  input.id = `parameter-${info.name}`;
+  name.htmlFor = input.id;
+  if (info.choices.length) input.append(...info.choices.map(choice => make('option', '', choice)));
+  else if (info.type === 'bool') input.type = 'checkbox';
+  else if (info.type === 'str') input.type = 'text';
+  else {
+    input.type = 'number';
+    input.step = info.type === 'int' ? 1 : 'any';
+    if (info.minimum !== null) input.min = info.minimum;
+    if (info.maximum !== null) input.max = info.maximum;
+  }
+  input.disabled = Boolean(stored);
+  input.addEventListener('change', () => {
+    if (input.type === 'number' && !input.reportValidity()) return;
+    const value = input.type === 'checkbox' ? input.checked : input.type === 'number' ? Number(input.value) : input.value;
+    send({do: 'parameter', name: info.name, value});
+  });
+  const range = info.minimum !== null && info.maximum !== null ? ` ${info.minimum} to ${info.maximum}.` : '';
+  row.append(name, input, make('p', 'hint', info.description + range));
+  return row;
+}
+
+function greet(hello) {
+  page.hello = hello;
+  document.title = `${hello.title} · rgbd_kcf_tracker`;
+  $('title').textContent = hello.title;
+  $('kind').textContent = stored ? 'a recorded run' : hello.live ? 'live' : 'recording';
+  $('transport').hidden = hello.live;
+  if (hello.live) $('no-why').textContent = 'The topics of a running tracker carry no candidates: record a bag and open it with rgbd-kcf view.';
+  $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
+  $('variant').disabled = Boolean(stored);
+  $('legend').textContent = 'score (line), confused with another (dashed); time to read, track and show';
+  page.settings = '';
+}
+
+// --- what is asked --------------------------------------------------------------------------------
+
+function send(message) {
+  if (page.socket && page.socket.readyState === WebSocket.OPEN) page.socket.send(JSON.stringify(message));
+}
+
+function currentFrame() {
+  return page.shown && page.shown.frame !== undefined ? page.shown.frame : 0;
+}
+
+function placeIn(event) {
+  const box = $('picture').getBoundingClientRect();
+  return [(event.clientX - box.left) * page.shown.size[0] / box.width, (event.clientY - box.top) * page.shown.size[1] / box.height];
+}
+
+function listenForPicking() {
+  const picture = $('picture');
+  let from = null, start = null;
+  picture.addEventListener('pointerdown', event => {
+    const touch = event.pointerType === 'touch';
+    if (!page.shown || event.button !== 0 || (touch && !picture.classList.contains('picking'))) return;
+    from = placeIn(event);
+    start = [event.clientX, event.clientY];
+    page.frameAtStart = currentFrame();
+    if (page.shown.playing) send({do: 'pause'});
+    picture.setPointerCapture(event.pointerId);
+  });
+  picture.addEventListener('pointermove', event => {
+    if (!from) return;
+    const [x, y] = placeIn(event);
+    page.drag = [Math.min(x, from[0]), Math.min(y, from[1]), Math.abs(x - from[0]), Math.abs(y - from[1])];
+    drawPicture(picture, page.bitmaps.color, page.shown, page.drag);
+  });
+  picture.addEventListener('pointerup', event => {
+    if (!from) return;
+    const moved = Math.hypot(event.clientX - start[0], event.clientY - start[1]);
+    const [x, y, width, height] = page.drag || [0, 0, 0, 0];
+    const frame = page.frameAtStart;
+    if (moved < 5) send({do: 'point', x: from[0], y: from[1], frame});
+    else if (width >= 2 && height >= 2) send({do: 'box', x, y, width, height, frame});
+    from = page.drag = null;
+    setPicking(false);
+    redraw();
+  });
+  picture.addEventListener('pointercancel', () => { from = page.drag = null; redraw(); });
+  $('pick').addEventListener('click', () => setPicking(!picture.classList.contains('picking')));
+}
+
+function setPicking(on) {
+  $('picture').classList.toggle('picking', on);
+  $('pick').setAttribute('aria-pressed', on);
+}
+
+function listenForPlaying(act) {
+  $('play').addEventListener('click', () => act({do: page.shown && page.shown.playing ? 'pause' : 'play'}));
+  $('back').addEventListener('click', () => act({do: 'step', by: -1}));
+  $('forward').addEventListener('click', () => act({do: 'step', by: 1}));
+  $('seek').addEventListener('input', () => { $('frame').textContent = $('seek').value; });
+  $('seek').addEventListener('change', () => { act({do: 'seek', frame: Number($('seek').value)}); $('seek').blur(); });
+  $('speed').addEventListener('change', () => { act({do: 'speed', value: Number($('speed').value)}); $('speed').blur(); });
+  $('time').addEventListener('click', event => {
+    if (!page.timeAxis || !page.entries.length || page.hello.live) return;
+    const t = page.timeAxis.time(event.clientX - $('time').getBoundingClientRect().left);
+    const nearest = page.entries.reduce((a, b) => Math.abs(b.t - t) < Math.abs(a.t - t) ? b : a);
+    act({do: 'seek', frame: nearest.frame});
+  });
+  document.addEventListener('keydown', event => {
+    if (/^(INPUT|SELECT|BUTTON|TEXTAREA|A|SUMMARY)$/.test(event.target.tagName) || page.hello.live) return;
+    const message = {' ': {do: page.shown && page.shown.playing ? 'pause' : 'play'}, ArrowLeft: {do: 'step', by: -1}, ArrowRight: {do: 'step', by: 1}}[event.key];
+    if (message) { event.preventDefault(); act(message); }
+  });
+}
+
+// --- over the socket ------------------------------------------------------------------------------
+
+function connect() {
+  const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/socket`);
+  socket.binaryType = 'arraybuffer';
+  page.socket = socket;
+  socket.addEventListener('message', async event => {
+    if (typeof event.data === 'string') {
+      const message = JSON.parse(event.data);
+      if (message.hello) { page.wait = 500; $('banner').hidden = true; page.entries = []; greet(message.hello); }
+      if (message.refused) say(message.refused, 8000);
+      return;
+    }
+    try {
+      await show(event.data);
+    } finally {
+      // Only now may the next one come: nothing queues. A page that is not seen draws nothing.
+      requestAnimationFrame(() => send({do: 'ack'}));
+      if (document.hidden) send({do: 'ack'});
+    }
+  });
+  socket.addEventListener('close', async event => {
+    say(event.reason === 'too slow' ? 'This browser was too slow; connecting again …' : 'Connection lost; trying again …');
+    setTimeout(async () => {
+      try {
+        const answer = await fetch('/', {method: 'GET', cache: 'no-store'});
+        if (answer.status === 401) { location.reload(); return; }
+      } catch { /* nobody answers yet */ }
+      connect();
+    }, page.wait);
+    page.wait = Math.min(5000, page.wait * 1.6);
+  });
+}
+
+// --- out of a file --------------------------------------------------------------------------------
+
+function replay() {
+  const {hello, moments} = JSON.parse(stored.textContent);
+  const unpacked = moments.map(text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
+  const heads = unpacked.map(buffer => unpack(buffer)[0]);
+  const run = {index: 0, playing: false, speed: 1, timer: 0};
+  document.body.classList.add('export');
+  greet({...hello, frames: unpacked.length, live: false});
+  const put = async index => {
+    run.index = Math.max(0, Math.min(index, unpacked.length - 1));
+    const past = heads.slice(0, run.index).flatMap(h => h.entries);
+    page.entries = [...past];
+    if (run.index === 0 || run.jump) page.trails.clear();
+    await show(unpacked[run.index]);
+    page.entries = [...past, ...heads[run.index].entries].filter(e => e.t >= heads[run.index].time - 60);
+    Object.assign(page.shown, {playing: run.playing, speed: run.speed});
+    redraw();
+    $('seek').value = run.index;
+    $('frame').textContent = `${heads[run.index].frame}`;
+  };
+  const next = async () => {
+    if (!run.playing) return;
+    if (run.index >= unpacked.length - 1) { run.playing = false; await put(run.index); return; }
+    const gap = heads[run.index + 1].time - heads[run.index].time;
+    const begun = performance.now();
+    await put(run.index + 1);
+    run.timer = setTimeout(next, Math.max(0, gap * 1000 / run.speed - (performance.now() - begun)));
+  };
+  const frames = heads.map(h => h.frame);
+  listenForPlaying(async message => {
+    clearTimeout(run.timer);
+    run.jump = true;
+    if (message.do === 'play') {
+      run.playing = true;
+      if (run.index >= unpacked.length - 1) run.index = -1;
+      run.jump = false;
+      await next();
+      return;
+    }
+    if (message.do === 'pause') run.playing = false;
+    if (message.do === 'step') { run.playing = false; run.index += message.by; }
+    if (message.do === 'seek') {
+      // The slider counts moments, the time line names frames.
+      const named = frames.indexOf(message.frame);
+      run.index = document.activeElement === $('seek') || named < 0 ? message.frame : named;
+    }
+    if (message.do === 'speed') run.speed = message.value;
+    await put(run.index);
+    run.jump = false;
+    if (run.playing) next();
+  });
+  put(0);
+}
+
+$('home').addEventListener('click', () => room.home());
+window.addEventListener('resize', redraw);
+matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
+if (stored) {
+  replay();
+} else {
+  listenForPicking();
+  listenForPlaying(send);
+  $('variant').addEventListener('change', () => { send({do: 'variant', name: $('variant').value}); $('variant').blur(); });
+  $('defaults').addEventListener('click', () => send({do: 'defaults'}));
+  connect();
+}

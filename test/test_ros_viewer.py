@@ -1,0 +1,206 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The viewer node beside a real tracker node, over real DDS and a real socket."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[view]'")
+
+import aiohttp
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from ros_rig import Rig, overrides, running_node, scene
+
+from rgbd_kcf_tracker import Box
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.ros.process import spin
+from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
+from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.live_page import LivePage, node_parameter
+from rgbd_kcf_tracker.view.server import Server
+
+pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
+
+
+@contextmanager
+def running_viewer(**values: Any) -> Iterator[tuple[ViewerNode, Server]]:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
+    node = ViewerNode(context=context, parameter_overrides=overrides({'rate': 60.0, **values}))
+    server = Server(node.page, port=0)
+    server.start()
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    stop = threading.Event()
+    thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
+    thread.start()
+    try:
+        yield node, server
+    finally:
+        server.stop()
+        stop.set()
+        thread.join(5)
+        node.destroy_node()
+        rclpy.shutdown(context=context)
+
+
+class Look:
+    """A browser's socket in a thread: the newest header, and what it asks."""
+
+    def __init__(self, server: Server) -> None:
+        self.headers: list[dict[str, Any]] = []
+        self._url = server.url
+        self._loop = asyncio.new_event_loop()
+        self._socket: Any = None
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        self._loop.run_until_complete(self._main())
+
+    async def _main(self) -> None:
+        async with aiohttp.ClientSession() as session:
+            self._socket = await session.ws_connect(
+                self._url + 'socket', origin=self._url.rstrip('/'), max_msg_size=0
+            )
+            async for message in self._socket:
+                if message.type is not aiohttp.WSMsgType.BINARY:
+                    continue
+                (length,) = struct.unpack_from('<I', message.data)
+                self.headers.append(json.loads(message.data[4 : 4 + length]))
+                await self._socket.send_json({'do': 'ack'})
+
+    def ask(self, **message: Any) -> None:
+        asyncio.run_coroutine_threadsafe(self._socket.send_json(message), self._loop).result(10)
+
+    def close(self) -> None:
+        asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop).result(10)
+        self._thread.join(10)
+
+
+def until(rig: Rig, condition: Callable[[], Any], seconds: float = 60) -> None:
+    """Frames go on until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, condition
+        rig.index = getattr(rig, 'index', -1) + 1  # type: ignore[attr-defined]
+        rig.send(rig.index)  # type: ignore[attr-defined]
+        time.sleep(0.03)
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    made = Rig()
+    yield made
+    made.close()
+
+
+def test_a_box_from_the_page_starts_the_tracker_and_is_shown(rig: Rig) -> None:
+    with running_node(rig), running_viewer() as (node, server):
+        assert rig.color.get_subscription_count() == 1  # nobody looks: the images are not asked for
+        look = Look(server)
+        until(rig, lambda: look.headers and 'points' in look.headers[-1]['blobs'])
+        header = look.headers[-1]
+        assert header['size'] == [320, 240]
+        assert header['camera'][0] == 290
+        assert header['targets'] == []
+        box = scene(rig.index)[2]  # type: ignore[attr-defined]
+        look.ask(do='box', x=box.x, y=box.y, width=box.width, height=box.height, frame=0)
+        until(rig, lambda: look.headers[-1]['targets'] and look.headers[-1]['targets'][0]['box'])
+        target = look.headers[-1]['targets'][0]
+        assert target['state'] == 'tracking'
+        assert Box(*target['box']).iou(scene(rig.index)[2]) > 0.4  # type: ignore[attr-defined]
+        assert target['position'] is not None
+        until(rig, lambda: look.headers[-1].get('values', {}).get('acceptance'))
+
+        look.ask(do='parameter', name='acceptance', value=0.6)
+        until(rig, lambda: look.headers[-1]['values'].get('acceptance') == 0.6)
+        assert 'acceptance: 0.6' in node.page.parameters_yaml()
+        look.ask(do='parameter', name='acceptance', value=7.0)
+        until(rig, lambda: any('between' in h['word'] for h in look.headers))
+        look.ask(do='step', by=1)
+        until(rig, lambda: any('recordings' in h['word'] for h in look.headers))
+
+        look.ask(do='remove', id=1)
+        until(rig, lambda: look.headers[-1]['targets'] == [])
+        look.ask(do='point', x=box.cx, y=box.cy, frame=0)
+        assert node.page.boxes_csv().count('tracking') > 2
+        look.close()
+        until(rig, lambda: rig.color.get_subscription_count() == 1)
+
+
+def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:
+    with running_node(rig, init_box='140,90,36,60'):
+        with running_viewer() as (_, server):
+            look = Look(server)
+            until(rig, lambda: len(look.headers) > 2)
+        before = len(rig.boxes)
+        until(rig, lambda: len(rig.boxes) > before + 3)
+
+
+def test_executable_says_where_the_page_is_and_needs_a_token_elsewhere() -> None:
+    command = [sys.executable, '-m', 'rgbd_kcf_tracker.ros.viewer_main', '--ros-args', '-p']
+    process = subprocess.Popen(
+        [*command, 'port:=0'], stderr=subprocess.STDOUT, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        assert 'open http://127.0.0.1:' in process.stdout.readline()
+        process.terminate()
+        assert process.wait(30) == 0
+    finally:
+        process.kill()
+        process.wait(10)
+    refused = subprocess.run(
+        [*command, 'host:=0.0.0.0'], capture_output=True, text=True, timeout=60
+    )
+    assert refused.returncode == 1
+    assert 'ssh -L' in refused.stderr
+
+
+def test_what_a_command_sets() -> None:
+    command = Command('parameter', {'name': 'padding', 'value': 2})
+    assert node_parameter(command, 'kcf') == ('kcf.padding', 2.0)
+    assert node_parameter(Command('variant', {'name': 'rgbd'}), 'kcf') == ('variant', 'rgbd')
+    for bad in (
+        Command('variant', {'name': 'mosse'}),
+        Command('parameter', {'name': 'padding', 'value': 'wide'}),
+        Command('parameter', {'name': 'colour', 'value': 1}),
+    ):
+        with pytest.raises(ParameterError):
+            node_parameter(bad, 'kcf')
+
+
+def test_states_of_the_answers() -> None:
+    page = LivePage('tracker', 10)
+    page.answer(1_000_000_000, None)
+    page.answer(2_000_000_000, Box(0, 0, 5, 5))
+    page.occluded(True)
+    page.answer(3_000_000_000, None)
+    page.figures({'state': 'LOST', 'work_median_ms': 'nan'})
+    page.answer(4_000_000_000, None)
+    page.board.show({}, {})
+    entries = page.board.take((-1, 0))[2]['entries']
+    assert [e['targets'][0][1] if e['targets'] else '' for e in entries] == [
+        '', 'tracking', 'occluded', 'lost',
+    ]  # fmt: skip
+    assert [e['t'] for e in entries] == [0, 1, 2, 3]
+    # A looping bag: stamps go back, and the last minute begins anew.
+    page.answer(500_000_000, None)
+    assert len(page.board.take((-1, 0))[2]['entries']) == 1

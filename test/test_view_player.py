@@ -1,0 +1,289 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A recording that is played, sought and tracked for the page, without a browser."""
+
+from __future__ import annotations
+
+import csv
+import io
+import struct
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[view]'")
+
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState, create_tracker
+from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.variants import default_parameters
+from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.export import export
+from rgbd_kcf_tracker.view.insight import Insight
+from rgbd_kcf_tracker.view.player import Player
+from rgbd_kcf_tracker.view.showing import (
+    Detail,
+    Seen,
+    confusion,
+    depth_picture,
+    ellipse,
+    room_points,
+    show,
+)  # fmt: skip
+from rgbd_kcf_tracker.view.sources import SimulatedRecording, first_box
+
+SIZE = (320, 180)
+
+
+@lru_cache(maxsize=1)
+def recording() -> SimulatedRecording:
+    return SimulatedRecording('occlusion', 3, 15.0, SIZE, 2.0)
+
+
+def tracked(variant: str = 'metric', frames: int | None = None) -> list[Track]:
+    """What the tracker says when it is run by itself."""
+    start, box = first_box(recording(), None)
+    tracker = create_tracker(variant)
+    images = recording().frames(start, frames)
+    return [tracker.start(next(images), box), *map(tracker.update, images)]
+
+
+class Rig:
+    """A player whose thread is this one."""
+
+    def __init__(self, box: bool = True, variant: str = 'metric') -> None:
+        start, first = first_box(recording(), None)
+        self.player = Player(recording(), variant, start=start, box=first if box else None)
+        self.player.board.watch(lambda: None)
+        self.player._guarded(self.player._open)
+
+    def ask(self, do: str, **values: Any) -> dict[str, Any]:
+        self.player._guarded(lambda: self.player._carry_out(Command(do, values)))
+        return self.seen
+
+    @property
+    def seen(self) -> dict[str, Any]:
+        return dict(self.player.board.take((-1, 0))[2])
+
+
+def assert_same(target: dict[str, Any], track: Track) -> None:
+    assert target['state'] == track.state.value
+    assert (target['box'] is None) == (track.box is None)
+    if track.box is not None:
+        assert target['box'] == [round(v, 2) for v in track.box.as_tuple()]
+
+
+def test_seeking_shows_what_the_tracker_says_of_that_frame() -> None:
+    rig = Rig()
+    expected = tracked()
+    for frame in (12, 3, 20, 0, 29):
+        seen = rig.ask('seek', frame=frame)
+        assert seen['frame'] == frame
+        assert_same(seen['targets'][0], expected[frame])
+    assert rig.ask('seek', frame=10_000)['frame'] == len(recording()) - 1
+
+
+def test_stepping_goes_both_ways() -> None:
+    rig = Rig()
+    assert rig.ask('step', by=1)['frame'] == 1
+    assert rig.ask('step', by=-1)['frame'] == 0
+    assert rig.ask('step', by=-1)['frame'] == 0
+
+
+def test_playing_reaches_the_end_and_stops() -> None:
+    player = Player(recording(), 'kcf', start=0, box=first_box(recording(), None)[1])
+    player.board.watch(lambda: None)
+    player.start()
+    player.do(Command('speed', {'value': 8.0}))
+    player.do(Command('play', {}))
+    wait(lambda: player._shown == len(recording()) - 1 and not player._playing)
+    player.stop()
+    rows = list(csv.DictReader(io.StringIO(player.boxes_csv())))
+    assert len(rows) == len(recording())
+    expected = tracked('kcf')
+    for row, track in zip(rows, expected, strict=True):
+        assert track.box is not None
+        assert float(row['x']) == pytest.approx(track.box.x, abs=1e-4)
+        assert (row['id'], row['state']) == ('1', 'tracking')
+
+
+def wait(condition: Callable[[], bool], seconds: float = 30) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_another_target_is_added_where_it_is_picked() -> None:
+    rig = Rig()
+    rig.ask('seek', frame=6)
+    seen = rig.ask('box', x=20.0, y=60.0, width=30.0, height=40.0, frame=4)
+    assert seen['frame'] == 4
+    assert [t['id'] for t in seen['targets']] == [1, 2]
+    assert seen['targets'][1]['box'] == [20, 60, 30, 40]
+    # The first is where it was, and both go on.
+    assert_same(seen['targets'][0], tracked()[4])
+    later = rig.ask('seek', frame=8)
+    assert [t['id'] for t in later['targets']] == [1, 2]
+    rig.ask('rename', id=2, name='chair')
+    assert rig.ask('remove', id=1)['targets'][0]['name'] == 'chair'
+
+
+def test_a_click_takes_the_surface_there() -> None:
+    rig = Rig(box=False)
+    assert rig.seen['targets'] == []
+    start, truth = first_box(recording(), None)
+    seen = rig.ask('point', x=truth.cx, y=truth.cy, frame=start)
+    assert Box(*seen['targets'][0]['box']).iou(truth) > 0.5
+
+
+def test_what_cannot_be_done_is_said_and_nothing_ends() -> None:
+    rig = Rig()
+    assert 'outside' in rig.ask('box', x=900.0, y=0.0, width=5.0, height=5.0, frame=0)['word']
+    assert 'outside' in rig.ask('point', x=-4.0, y=0.0, frame=0)['word']
+    assert 'nothing' in rig.ask('parameter', name='nothing', value=1)['word']
+    assert 'between' in rig.ask('parameter', name='acceptance', value=7.0)['word']
+    assert 'unknown variant' in rig.ask('variant', name='mosse')['word']
+    assert rig.ask('box', x=0.0, y=0.0, width=0.0, height=5.0, frame=0)['word']
+    assert rig.ask('seek', frame=5)['targets'][0]['state'] == 'tracking'
+
+
+def test_a_parameter_makes_the_run_go_on_from_the_frame_shown() -> None:
+    rig = Rig()
+    rig.ask('seek', frame=10)
+    seen = rig.ask('parameter', name='acceptance', value=0.6)
+    assert seen['frame'] == seen['front'] == 10
+    assert seen['values']['acceptance'] == 0.6
+    content = yaml.safe_load(rig.player.parameters_yaml())['/**']['ros__parameters']
+    assert content['variant'] == 'metric'
+    assert content['metric']['acceptance'] == 0.6
+    seen = rig.ask('variant', name='rgbd')
+    assert seen['variant'] == 'rgbd'
+    assert seen['targets'][0]['box'] is not None
+    # As if it had been started there by hand.
+    tracker = create_tracker('rgbd')
+    box = tracked(frames=11)[10].box
+    frames = recording().frames(10, 13)
+    assert box is not None
+    tracker.start(next(frames), box)
+    last = [tracker.update(frame) for frame in frames][-1]
+    assert_same(rig.ask('seek', frame=12)['targets'][0], last)
+    assert rig.ask('defaults')['values']['depth_threshold'] == 0.15
+
+
+def test_the_last_minute_ends_at_the_frame_shown() -> None:
+    rig = Rig()
+    entries = rig.ask('seek', frame=12)['entries']
+    assert [e['frame'] for e in entries] == list(range(13))
+    assert all(e['targets'][0][1] == 'tracking' for e in entries[:5])
+    assert [e['frame'] for e in rig.ask('seek', frame=4)['entries']] == list(range(5))
+
+
+def test_a_shown_moment_has_all_pictures() -> None:
+    rig = Rig()
+    rig.ask('seek', frame=5)
+    _, _, header, blobs = rig.player.board.take((-1, 0))
+    assert set(blobs) >= {'color', 'depth', 'points', 'view_1_0'}
+    for name in ('color', 'depth', 'view_1_0'):
+        assert blobs[name].startswith(b'\xff\xd8')
+    assert header['targets'][0]['considered'][0]['probability'] > 0.5
+    assert header['floor'] is not None
+
+
+def test_points_are_where_the_camera_sees_them() -> None:
+    depth = np.full((40, 60), np.nan, np.float32)
+    depth[20, 30] = depth[8, 8] = 2.0
+    depth[9, 9] = 100.0
+    color = np.zeros((40, 60, 3), np.uint8)
+    color[20, 30] = (1, 2, 3)
+    data = room_points(Frame(color, depth), Intrinsics(50, 50, 30, 20), 100_000)
+    count = len(data) // 9
+    assert count == 2
+    places = struct.unpack_from('<6h', data)
+    assert places[3:] == (0, 0, 2000)
+    assert tuple(data[6 * count + 3 :]) == (3, 2, 1)
+
+
+def test_fewer_points_than_asked_for() -> None:
+    frame = next(recording().frames(0, 1))
+    k = recording().intrinsics
+    assert k is not None
+    assert 500 < len(room_points(frame, k, 1000)) // 9 <= 1000
+
+
+def test_depth_is_brighter_the_farther_also_in_grey() -> None:
+    depth = np.tile(np.linspace(0.5, 8, 64, dtype=np.float32), (16, 1))
+    depth[0, 0] = np.nan
+    picture, far = depth_picture(depth, 1000)
+    assert far == 8
+    grey = picture[8].astype(int) @ (11, 59, 30)
+    assert (np.diff(grey) >= 0).all()
+    assert tuple(picture[0, 0]) == (224, 219, 216)
+    empty, far = depth_picture(np.full((8, 8), np.nan, np.float32), 1000)
+    assert (empty == (224, 219, 216)).all()
+    assert far == 1
+
+
+def test_the_ellipse_holds_what_it_says() -> None:
+    rng = np.random.default_rng(0)
+    places = rng.normal(size=(4000, 3)) * (0.9, 0.1, 0.3)
+    turned = places @ np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]) + (1, 0, 4)
+    x, z, major, minor, angle = ellipse(turned, np.full(4000, 1 / 4000))
+    away = turned[:, [0, 2]] - (x, z)
+    along = away @ (np.cos(angle), np.sin(angle)) / major
+    across = away @ (-np.sin(angle), np.cos(angle)) / minor
+    assert np.mean(along**2 + across**2 < 1) == pytest.approx(0.95, abs=0.01)
+
+
+def test_confusion_is_of_what_was_not_taken() -> None:
+    from rgbd_kcf_tracker.view.insight import Considered
+
+    here, there = Box(0, 0, 10, 10), Box(50, 0, 10, 10)
+    insight = Insight((Considered(here, 0.9, {}), Considered(there, 0.4, {})))
+    assert confusion(Track(here, TrackState.TRACKING), insight) == 0.4
+    assert confusion(Track(None, TrackState.OCCLUDED), insight) == 0.9
+    assert confusion(Track(here, TrackState.TRACKING), None) == 0
+
+
+def test_a_frame_without_depth_is_shown_without() -> None:
+    color = np.zeros((20, 30, 3), np.uint8)
+    header, blobs = show(Seen(Frame(color)), Detail())
+    assert set(blobs) == {'color'}
+    assert header['guessed']
+
+
+def test_no_frame_to_show_is_an_error() -> None:
+    with pytest.raises(RecordingError, match='no frame 99'):
+        Player(recording(), 'metric', start=99)
+
+
+def test_export_is_one_file_with_every_moment(tmp_path: Path) -> None:
+    start, box = first_box(recording(), None)
+    path = tmp_path / 'run.html'
+    count = export(recording(), path, 'metric', default_parameters('metric'), start, 12, box)
+    text = path.read_text(encoding='utf-8')
+    assert count == 12
+    assert '</script><script>' not in text.split('id="stored"')[1].split('</script>')[0]
+    assert 'src="' not in text
+    assert '<link rel="stylesheet"' not in text
+    assert "default-src 'none'" in text
+
+
+def test_command_exports_and_refuses_to_replace(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / 'run.html'
+    command = ['view', '--seed', '3', '--end', '4', '--export', str(path)]
+    assert main(command) == 0
+    assert '4 moments' in capsys.readouterr().out
+    assert main(command) == 2
+    assert '--overwrite' in capsys.readouterr().err
+    assert main(['view', '--seed', '3', '--host', '0.0.0.0']) == 2
+    assert 'ssh -L' in capsys.readouterr().err

@@ -1,0 +1,366 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who is answered, and with what: the viewer's server over real HTTP and WebSockets."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import struct
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[view]'")
+import aiohttp
+
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.view.board import Board
+from rgbd_kcf_tracker.view.commands import Command, parse
+from rgbd_kcf_tracker.view.server import COOKIE, Server, is_loopback
+from rgbd_kcf_tracker.view.showing import pack
+
+TOKEN = 'correct horse'
+
+
+class Stub:
+    """A controller that keeps what it is asked."""
+
+    def __init__(self) -> None:
+        self.board = Board()
+        self.asked: list[Command] = []
+
+    def do(self, command: Command) -> None:
+        self.asked.append(command)
+
+    def description(self) -> dict[str, Any]:
+        return {'title': 'stub', 'live': False, 'frames': 3, 'variants': [], 'several': True}
+
+    def boxes_csv(self) -> str:
+        return 'id,frame\n'
+
+    def parameters_yaml(self) -> str:
+        return 'a: 1\n'
+
+
+@pytest.fixture
+def stub() -> Stub:
+    return Stub()
+
+
+@pytest.fixture
+def server(stub: Stub, request: pytest.FixtureRequest) -> Iterator[Server]:
+    token = getattr(request, 'param', '')
+    made = Server(stub, port=0, token=token)
+    made.start()
+    yield made
+    made.stop()
+
+
+def run(action: Callable[[aiohttp.ClientSession], Awaitable[Any]]) -> Any:
+    async def main() -> Any:
+        jar = aiohttp.CookieJar(unsafe=True)
+        async with aiohttp.ClientSession(cookie_jar=jar) as session:
+            return await asyncio.wait_for(action(session), 30)
+
+    return asyncio.run(main())
+
+
+def header_of(packet: bytes) -> dict[str, Any]:
+    (length,) = struct.unpack_from('<I', packet)
+    return dict(json.loads(packet[4 : 4 + length]))
+
+
+def origin(server: Server) -> str:
+    return server.url.rstrip('/')
+
+
+def test_page_is_served_with_headers_that_keep_others_out(server: Server) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        for path, kind in (
+            ('', 'text/html'),
+            ('page.js', 'text/javascript'),
+            ('page.css', 'text/css'),
+        ):
+            async with session.get(server.url + path) as answer:
+                assert answer.status == 200
+                assert answer.content_type == kind
+                assert "frame-ancestors 'none'" in answer.headers['Content-Security-Policy']
+                assert answer.headers['X-Content-Type-Options'] == 'nosniff'
+        async with session.get(server.url + 'boxes.csv') as answer:
+            assert 'attachment' in answer.headers['Content-Disposition']
+        async with session.get(server.url + '../setup.py') as answer:
+            assert answer.status == 404
+
+    run(ask)
+
+
+@pytest.mark.parametrize('host', ['evil.example', 'evil.example:8080', '10.0.0.7', ''])
+def test_another_name_for_this_machine_is_refused(server: Server, host: str) -> None:
+    """DNS rebinding: the browser is told that evil.example is 127.0.0.1."""
+
+    async def ask(session: aiohttp.ClientSession) -> None:
+        async with session.get(server.url, headers={'Host': host}) as answer:
+            assert answer.status in (400, 403)
+            assert '<canvas' not in await answer.text()
+
+    run(ask)
+
+
+@pytest.mark.parametrize(
+    'origin', ['http://evil.example', 'null', 'http://127.0.0.1:1', 'file://', None]
+)
+def test_a_socket_opens_only_for_the_page_itself(server: Server, origin: str | None) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        headers = {} if origin is None else {'Origin': origin}
+        with pytest.raises(aiohttp.WSServerHandshakeError, match='403'):
+            await session.ws_connect(server.url + 'socket', headers=headers)
+
+    run(ask)
+
+
+def test_newest_moment_comes_only_when_the_last_is_drawn(server: Server, stub: Stub) -> None:
+    async def ask(session: aiohttp.ClientSession) -> list[dict[str, Any]]:
+        socket = await session.ws_connect(server.url + 'socket', origin=origin(server))
+        assert (await socket.receive_json())['hello']['title'] == 'stub'
+        for frame in range(5):
+            stub.board.note({'t': frame / 10, 'frame': frame})
+            stub.board.show({'frame': frame}, {})
+            await asyncio.sleep(0.02)
+        came = [header_of((await socket.receive()).data)]
+        with pytest.raises(asyncio.TimeoutError):
+            await socket.receive(timeout=0.2)
+        await socket.send_json({'do': 'ack'})
+        came.append(header_of((await socket.receive()).data))
+        return came
+
+    first, second = run(ask)
+    # What lay between is not queued, but its figures are not lost either.
+    assert second['frame'] == 4
+    entries = [e['frame'] for e in first['entries'] + second['entries']]
+    assert entries == [0, 1, 2, 3, 4]
+    assert (first['anew'], second['anew']) == (True, False)
+
+
+def test_two_browsers_see_the_same_and_one_that_sleeps_holds_nobody(
+    server: Server, stub: Stub
+) -> None:
+    async def ask(session: aiohttp.ClientSession) -> int:
+        asleep = await session.ws_connect(server.url + 'socket', origin=origin(server))
+        awake = await session.ws_connect(server.url + 'socket', origin=origin(server))
+        await awake.receive_json()
+        last = -1
+        for frame in range(20):
+            begun = time.monotonic()
+            stub.board.show({'frame': frame}, {'color': b'x' * 200_000})
+            assert time.monotonic() - begun < 0.5  # nobody who looks can hold the tracker up
+            last = header_of((await awake.receive()).data)['frame']
+            await awake.send_json({'do': 'ack'})
+        await asleep.close()
+        return last
+
+    assert run(ask) == 19
+    deadline = time.monotonic() + 5
+    while stub.board.watched and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not stub.board.watched
+
+
+@pytest.mark.parametrize(
+    'message',
+    [
+        '', 'not json', '[]', '{}', '{"do": 1}', '{"do": "rm -rf"}', '{"do": "seek"}',
+        '{"do": "seek", "frame": "1"}', '{"do": "seek", "frame": 1, "more": 2}',
+        '{"do": "seek", "frame": 1e999}', '{"do": "seek", "frame": true}',
+        '{"do": "box", "x": NaN, "y": 0, "width": 1, "height": 1, "frame": 0}',
+        '{"do": "box", "x": 1e400, "y": 0, "width": 1, "height": 1, "frame": 0}',
+        '{"do": "parameter", "name": "cells", "value": [1]}',
+        '{"do": "parameter", "name": "cells", "value": {"a": 1}}',
+        '[' * 2000 + ']' * 2000,
+    ],
+)  # fmt: skip
+def test_hostile_messages_are_refused_and_nothing_ends(
+    server: Server, stub: Stub, message: str
+) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        socket = await session.ws_connect(server.url + 'socket', origin=origin(server))
+        await socket.receive_json()
+        await socket.send_str(message)
+        assert 'refused' in await socket.receive_json()
+        await socket.send_json({'do': 'pause'})
+        await socket.send_json({'do': 'seek', 'frame': 2})
+        for _ in range(100):
+            if len(stub.asked) == 2:
+                break
+            await asyncio.sleep(0.02)
+
+    run(ask)
+    assert [c.do for c in stub.asked] == ['pause', 'seek']
+
+
+def test_large_binary_and_too_many_messages_end_only_their_own_socket(
+    server: Server, stub: Stub
+) -> None:
+    async def ask(session: aiohttp.ClientSession) -> list[int | None]:
+        codes = []
+        for send in (
+            lambda s: s.send_str('x' * 100_000),
+            lambda s: s.send_bytes(b'\0' * 10),
+        ):
+            socket = await session.ws_connect(server.url + 'socket', origin=origin(server))
+            await socket.receive_json()
+            await send(socket)
+            while not socket.closed:
+                await socket.receive(timeout=5)
+            codes.append(socket.close_code)
+        socket = await session.ws_connect(server.url + 'socket', origin=origin(server))
+        for _ in range(200):
+            if socket.closed:
+                break
+            await socket.send_json({'do': 'pause'})
+        while not socket.closed:
+            await socket.receive(timeout=5)
+        codes.append(socket.close_code)
+        async with session.get(server.url) as answer:
+            assert answer.status == 200
+        return codes
+
+    assert run(ask) == [1009, 1003, 1008]
+
+
+def test_only_so_many_browsers(server: Server) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        held = [
+            await session.ws_connect(server.url + 'socket', origin=origin(server))
+            for _ in range(16)
+        ]
+        with pytest.raises(aiohttp.WSServerHandshakeError, match='503'):
+            await session.ws_connect(server.url + 'socket', origin=origin(server))
+        await held[0].close()
+        await asyncio.sleep(0.2)
+        await session.ws_connect(server.url + 'socket', origin=origin(server))
+
+    run(ask)
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+def test_nothing_is_shown_before_the_token_is_given(server: Server, stub: Stub) -> None:
+    stub.board.show({'frame': 0}, {})
+
+    async def ask(session: aiohttp.ClientSession) -> None:
+        named = {'Origin': origin(server)}
+        async with session.get(server.url) as answer:
+            assert answer.status == 401
+            assert '<canvas' not in await answer.text()
+        for path in ('boxes.csv', 'parameters.yaml', 'page.js', 'room.js'):
+            async with session.get(server.url + path) as answer:
+                assert answer.status == 401
+        with pytest.raises(aiohttp.WSServerHandshakeError, match='401'):
+            await session.ws_connect(server.url + 'socket', headers=named)
+        begun = time.monotonic()
+        async with session.post(
+            server.url + 'login', data={'token': 'wrong horse'}, headers=named
+        ) as answer:
+            assert answer.status == 401
+            assert 'not the token' in await answer.text()
+        assert time.monotonic() - begun >= 0.9
+        async with session.post(server.url + 'login', data={'token': TOKEN}) as answer:
+            assert answer.status == 403  # a form of nobody knows where
+        async with session.post(
+            server.url + 'login', data={'token': TOKEN}, headers=named
+        ) as answer:
+            assert answer.status == 200
+            assert '<canvas' in await answer.text()
+        (cookie,) = (c for c in session.cookie_jar if c.key == COOKIE)
+        assert cookie['httponly']
+        assert cookie['samesite'] == 'Strict'
+        assert TOKEN not in cookie.value
+        socket = await session.ws_connect(server.url + 'socket', headers=named)
+        assert 'hello' in await socket.receive_json()
+
+    run(ask)
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+def test_a_login_too_large_is_refused(server: Server) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        async with session.post(
+            server.url + 'login', data={'token': 'x' * 10_000}, headers={'Origin': origin(server)}
+        ) as answer:
+            assert answer.status == 413
+
+    run(ask)
+
+
+def test_other_addresses_need_a_token_that_is_long_enough(stub: Stub) -> None:
+    for host in ('0.0.0.0', '192.168.1.5', '::', 'robot.local'):
+        with pytest.raises(ParameterError, match='ssh -L'):
+            Server(stub, host=host)
+    with pytest.raises(ParameterError, match='too short'):
+        Server(stub, host='0.0.0.0', token='1234')
+    assert is_loopback('127.0.0.9')
+    assert not is_loopback('127.0.0.1.evil.example')
+
+
+def test_a_port_that_is_taken_is_said(server: Server, stub: Stub) -> None:
+    port = int(server.url.rsplit(':', 1)[1].strip('/'))
+    with pytest.raises(ParameterError, match='--port'):
+        Server(stub, port=port).start()
+    with pytest.raises(ParameterError, match='--port'):
+        Server(stub, port=99999).start()
+
+
+def test_commands_are_typed() -> None:
+    box = '{"do": "box", "x": 1, "y": 2.5, "width": 3, "height": 4, "frame": 7}'
+    assert parse(box).values == {'x': 1.0, 'y': 2.5, 'width': 3.0, 'height': 4.0, 'frame': 7}
+    assert parse('{"do": "rename", "id": 1, "name": "  Ada  "}').values['name'] == 'Ada'
+    long = json.dumps({'do': 'rename', 'id': 1, 'name': 'x' * 1000})
+    assert len(parse(long).values['name']) == 40
+
+
+def test_board_keeps_a_minute_and_begins_anew_when_rewound() -> None:
+    board = Board()
+    for second in range(100):
+        board.note({'t': float(second)})
+    board.show({}, {})
+    _, since, header, _ = board.take((-1, 0))
+    assert [e['t'] for e in header['entries']] == [float(t) for t in range(39, 100)]
+    board.rewind([{'t': 5.0}])
+    _, since, header, _ = board.take(since)
+    assert (header['anew'], header['entries']) == (True, [{'t': 5.0}])
+    assert board.take(since)[2]['entries'] == []
+
+
+def test_board_from_many_threads() -> None:
+    board = Board()
+    board.show({}, {})
+
+    def write() -> None:
+        for i in range(200):
+            board.note({'t': float(i)})
+            board.show({'n': i}, {})
+
+    threads = [threading.Thread(target=write) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(t.is_alive() for t in threads):
+        number, _, header, _ = board.take((-1, 0))
+        assert number >= 1
+        assert isinstance(header['entries'], list)
+    assert board.newer(800) == 801
+
+
+def test_packets_place_their_blobs_on_eight_bytes() -> None:
+    packet = pack({'a': 1}, {'one': b'12345', 'two': np.arange(4, dtype='<i2').tobytes()})
+    (length,) = struct.unpack_from('<I', packet)
+    header = header_of(packet)
+    assert (4 + length) % 8 == 0
+    offset, size = header['blobs']['two']
+    assert offset % 8 == 0
+    start = 4 + length + offset
+    np.testing.assert_array_equal(np.frombuffer(packet[start : start + size], '<i2'), range(4))
