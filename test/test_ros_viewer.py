@@ -170,7 +170,7 @@ def test_executable_says_where_the_page_is_and_needs_a_token_elsewhere() -> None
     refused = subprocess.run(
         [*command, 'host:=0.0.0.0'], capture_output=True, text=True, timeout=60
     )
-    assert refused.returncode == 1
+    assert refused.returncode == 2
     assert 'ssh -L' in refused.stderr
 
 
