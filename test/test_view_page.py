@@ -348,5 +348,13 @@ def test_an_exported_file_plays_by_itself(chromium: Browser, tmp_path: Path) -> 
     page.press('#play')
     page.until('page.shown.frame === 14 && !page.shown.playing')
     assert page.value('page.entries.length') == 15
+    page.value(
+        "(() => { const s = document.getElementById('seek'); s.value = 4; "
+        "s.dispatchEvent(new Event('change')); })()"
+    )
+    page.until('page.shown.frame === 4')
+    page.size(900, 700)
+    assert page.value("document.getElementById('seek').value") == '4'
+    assert page.value("document.getElementById('frame').textContent") == 'frame 4'
     assert page.value("document.getElementById('yaml').offsetParent") is None
     assert page.errors == []

@@ -8,7 +8,7 @@ const $ = id => document.getElementById(id);
 const stored = $('stored');
 const page = {
   hello: null, shown: null, entries: [], trails: new Map(), points: null, bitmaps: {}, drag: null,
-  socket: null, wait: 500, views: new Map(), settings: '', timeAxis: null, drawn: 0, word: 0,
+  socket: null, wait: 500, views: new Map(), settings: '', timeAxis: null, drawn: 0, word: 0, moment: 0,
 };
 const room = new Room($('room'), $('labels'), stored ? null : (x, y) => send({do: 'point', x, y, frame: currentFrame()}));
 
@@ -95,8 +95,10 @@ function showWords(shown) {
   else if (shown.busy) say(shown.busy, 1500);
   if (page.hello && !page.hello.live) {
     $('seek').max = page.hello.frames - 1;
-    if (document.activeElement !== $('seek') || shown.playing) $('seek').value = shown.frame;
-    $('frame').textContent = `${shown.frame} / ${page.hello.frames - 1}`;
+    // In a file the slider counts its moments, of which there may be fewer than frames.
+    const place = stored ? page.moment : shown.frame;
+    if (document.activeElement !== $('seek') || shown.playing) $('seek').value = place;
+    $('frame').textContent = stored ? `frame ${shown.frame}` : `${shown.frame} / ${page.hello.frames - 1}`;
     $('play').textContent = shown.playing ? 'Pause' : 'Play';
     if (document.activeElement !== $('speed')) $('speed').value = String(shown.speed);
   }
@@ -374,7 +376,7 @@ function replay() {
   document.body.classList.add('export');
   greet({...hello, frames: unpacked.length, live: false});
   const put = async index => {
-    run.index = Math.max(0, Math.min(index, unpacked.length - 1));
+    run.index = page.moment = Math.max(0, Math.min(index, unpacked.length - 1));
     const past = heads.slice(0, run.index).flatMap(h => h.entries);
     page.entries = [...past];
     if (run.index === 0 || run.jump) page.trails.clear();
@@ -382,8 +384,6 @@ function replay() {
     page.entries = [...past, ...heads[run.index].entries].filter(e => e.t >= heads[run.index].time - 60);
     Object.assign(page.shown, {playing: run.playing, speed: run.speed});
     redraw();
-    $('seek').value = run.index;
-    $('frame').textContent = `${heads[run.index].frame}`;
   };
   const next = async () => {
     if (!run.playing) return;
