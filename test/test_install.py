@@ -168,15 +168,19 @@ def test_rosdep_needs_apt_alone() -> None:
     assert not keys & {'mcap-ros2-support'}
 
 
-def test_the_nodes_of_a_robot_need_nothing_that_apt_lacks() -> None:
-    pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
-    code = f"""
+WITHOUT = f"""
 import sys
 class Absent:
     def find_spec(self, name, path=None, target=None):
         if name.partition('.')[0] in {NOT_ON_A_ROBOT!r}:
-            raise ModuleNotFoundError(name)
+            raise ModuleNotFoundError(f'No module named {{name!r}}', name=name)
 sys.meta_path.insert(0, Absent())
+"""
+
+
+def test_the_nodes_of_a_robot_need_nothing_that_apt_lacks() -> None:
+    pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+    code = f"""{WITHOUT}
 import rgbd_kcf_tracker.ros.tracker_node, rgbd_kcf_tracker.live.auto_init
 import rgbd_kcf_tracker.ros.viewer_node, rgbd_kcf_tracker.view.server
 from rgbd_kcf_tracker.live.session import warm_up
@@ -186,6 +190,29 @@ for variant in VARIANTS:
 print('works')
 """
     assert run(sys.executable, '-c', code, cwd=ROOT).endswith('works\n')
+
+
+@pytest.mark.parametrize(
+    ('main', 'arguments'),
+    [
+        ('rgbd_kcf_tracker.cli.main', ['info', 'walk.mcap']),
+        ('rgbd_kcf_tracker.ros.replay_main', ['--ros-args', '-p', 'bag:=walk.mcap']),
+    ],
+)
+def test_what_reads_bags_says_what_is_missing(
+    main: str, arguments: list[str], tmp_path: Path
+) -> None:
+    if 'ros' in main.split('.'):
+        pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+    (tmp_path / 'walk.mcap').write_bytes(b'nothing')
+    code = f'{WITHOUT}\nfrom {main} import main\nsys.exit(main({arguments!r}))'
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=tmp_path, text=True, capture_output=True, timeout=120,
+        env=clean_environment() | {'PYTHONPATH': str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert 'is missing: pip install rosbags' in done.stderr
+    assert 'Traceback' not in done.stderr
 
 
 def test_the_image_is_made_of_files_that_are_there() -> None:

@@ -66,6 +66,13 @@ __all__ = [
     'read_mot',
 ]
 
+BAG_LIBRARIES = ('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard')
+"""Not in apt, and so not on every robot: the tracker node does without."""
+HOW_TO_GET_THEM = (
+    'pip install rosbags mcap mcap-ros2-support, on Ubuntu with --user --break-system-packages '
+    '(docs/install.md)'
+)
+
 _HOMES = {
     'BagWriter': 'bag_writer',
     'CameraTopics': 'bag_writer',
@@ -102,7 +109,14 @@ def __getattr__(name: str) -> Any:
 
     if name not in _HOMES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
+    try:
+        value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
+    except ModuleNotFoundError as error:
+        if error.name not in BAG_LIBRARIES:
+            raise
+        from rgbd_kcf_tracker.errors import RecordingError
+
+        raise RecordingError(f'{error.name} is missing: {HOW_TO_GET_THEM}') from None
     globals()[name] = value
     return value
 

@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from rclpy.executors import Executor
 
     from rgbd_kcf_tracker.ros.replay_node import ReplayNode
-HOW_TO_GET = (
-    'which reads bags and is not in apt: python3 -m pip install --user --break-system-packages '
-    'rosbags mcap mcap-ros2-support (docs/install.md)'
-)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -26,6 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     import threading
 
     from rgbd_kcf_tracker.live.memory import keep_large_blocks
+    from rgbd_kcf_tracker.recordings import BAG_LIBRARIES, HOW_TO_GET_THEM
     from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
@@ -41,9 +38,9 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         from rgbd_kcf_tracker.ros.replay_node import ReplayNode
     except ModuleNotFoundError as error:
-        if error.name not in ('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'):
+        if error.name not in BAG_LIBRARIES:
             raise
-        print(f'replay: {error.name} is missing, {HOW_TO_GET}', file=sys.stderr)
+        print(f'replay: {error.name} is missing: {HOW_TO_GET_THEM}', file=sys.stderr)
         return 2
 
     def live(executor: Executor, node: ReplayNode) -> None:
