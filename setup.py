@@ -30,9 +30,12 @@ ROS = [
     'ros-rosgraph-msgs==2.0.3',
 ]
 # What a robot does without; extras.py tells which command needs which.
-REPORT = ['matplotlib>=3.7', 'jinja2']
+BATCH = ['threadpoolctl']
+REPORT = ['matplotlib>=3.7', 'jinja2', 'threadpoolctl']
 VIDEO = ['imageio-ffmpeg']
 TOOLS = [*REPORT, *VIDEO, 'tqdm', 'psutil']
+CLUSTER = ['distributed>=2022.12', 'threadpoolctl']
+PARQUET = ['pyarrow']
 TEST = [
     'pytest>=8',
     'pytest-timeout',
@@ -114,11 +117,14 @@ setup(
         'PyYAML',
     ],
     extras_require={
+        'batch': BATCH,
         'report': REPORT,
         'video': VIDEO,
         'tools': TOOLS,
+        'cluster': CLUSTER,
+        'parquet': PARQUET,
         'ros': ROS,
-        'test': [*TOOLS, *TEST],
+        'test': [*TOOLS, *CLUSTER, *PARQUET, *TEST],
         'lint': LINT,
     },
     zip_safe=False,
