@@ -20,7 +20,7 @@ else:
     Protocol = object
 
 PROGRAM = 'rgbd-kcf'
-SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'bench')
+SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'sweep', 'bench')
 
 EXIT_USAGE = 2
 
