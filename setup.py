@@ -30,10 +30,13 @@ ROS = [
     'ros-rosgraph-msgs==2.0.3',
 ]
 # What a robot does without; extras.py tells which command needs which.
-REPORT = ['matplotlib>=3.7', 'jinja2']
+BATCH = ['threadpoolctl']
+REPORT = ['matplotlib>=3.7', 'jinja2', 'threadpoolctl']
 VIDEO = ['imageio-ffmpeg']
 VIEW = ['aiohttp>=3.8']
 TOOLS = [*REPORT, *VIDEO, 'tqdm', 'psutil']
+CLUSTER = ['distributed>=2022.12', 'threadpoolctl']
+PARQUET = ['pyarrow']
 TEST = [
     'pytest>=8',
     'pytest-timeout',
@@ -122,12 +125,15 @@ setup(
         'PyYAML',
     ],
     extras_require={
+        'batch': BATCH,
         'report': REPORT,
         'video': VIDEO,
         'view': VIEW,
         'tools': TOOLS,
+        'cluster': CLUSTER,
+        'parquet': PARQUET,
         'ros': ROS,
-        'test': [*TOOLS, *VIEW, *TEST],
+        'test': [*TOOLS, *VIEW, *CLUSTER, *PARQUET, *TEST],
         'lint': LINT,
         'docs': DOCS,
     },

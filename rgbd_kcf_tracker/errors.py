@@ -34,3 +34,7 @@ class DatasetError(RgbdKcfError):
 
 class MissingExtraError(RgbdKcfError):
     """A library that only some commands need is not installed."""
+
+
+class WorkersError(RgbdKcfError):
+    """The processes or machines that jobs are to run on cannot be had, or not be relied on."""

@@ -10,12 +10,18 @@ from importlib.util import find_spec
 from rgbd_kcf_tracker.errors import MissingExtraError
 
 EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
-    'report': (('matplotlib', 'jinja2'), 'python3-matplotlib python3-jinja2'),
+    'batch': (('threadpoolctl',), 'python3-threadpoolctl'),
+    'report': (
+        ('matplotlib', 'jinja2', 'threadpoolctl'),
+        'python3-matplotlib python3-jinja2 python3-threadpoolctl',
+    ),
+    'cluster': (('distributed', 'threadpoolctl'), 'python3-distributed python3-threadpoolctl'),
+    'parquet': (('pyarrow',), ''),
     'video': (('imageio_ffmpeg',), 'ffmpeg'),
     'view': (('aiohttp',), 'python3-aiohttp'),
     'tools': (('tqdm', 'psutil'), 'python3-tqdm python3-psutil'),
 }
-"""Extras of the installation: their modules, and Ubuntu's packages with the same."""
+"""Extras of the installation: their modules, and Ubuntu's packages with the same, if any."""
 
 
 def require(extra: str, purpose: str) -> None:
@@ -36,4 +42,5 @@ def require(extra: str, purpose: str) -> None:
 def how_to_get(extra: str) -> str:
     """What to type to install an extra."""
     packages = EXTRAS[extra][1]
-    return f"pip install 'rgbd_kcf_tracker[{extra}]', or on Ubuntu: sudo apt install {packages}"
+    ubuntu = f', or on Ubuntu: sudo apt install {packages}' if packages else ''
+    return f"pip install 'rgbd_kcf_tracker[{extra}]'{ubuntu}"

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from rgbd_kcf_tracker.batch.content import files_digest
 from rgbd_kcf_tracker.errors import DatasetError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import (
@@ -25,6 +26,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
 from rgbd_kcf_tracker.evaluation.datasets.images import unrotate
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
+from rgbd_kcf_tracker.evaluation.runner import identify
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter
@@ -98,14 +100,14 @@ def test_our_layout_starts_where_the_target_is_clearly_in_view(own: Path):
 
 
 def test_a_sequence_is_another_one_when_its_files_change(own: Path):
-    (before,) = open_dataset(str(own))
-    (same,) = open_dataset(str(own))
-    assert before.identity == same.identity
-    write_images(own / 'rgb', ['000005.png'])
-    (more,) = open_dataset(str(own))
-    (own / 'groundtruth.txt').write_text('1,2,10,20\n' * 4)
-    (other,) = open_dataset(str(own))
-    assert len({before.identity, more.identity, other.identity}) == 3
+    digests = []
+    for change in (lambda: None, lambda: write_images(own / 'rgb', ['000005.png']),
+                   lambda: (own / 'groundtruth.txt').write_text('1,2,10,20\n' * 4)):  # fmt: skip
+        change()
+        (sequence,), _ = identify(open_dataset(str(own)), [])
+        assert sequence.digest == files_digest(sequence.content)
+        digests.append(sequence.digest)
+    assert len(set(digests)) == 3
 
 
 def test_several_people_in_one_folder(tmp_path: Path):
@@ -126,10 +128,11 @@ def test_several_people_in_one_folder(tmp_path: Path):
     assert samples[0].frame.color[0, 0, 0] == 30
     assert len(list(bob.open().samples)) == 40
     assert not opened.has_body
+    (ann, bob), _ = identify([ann, bob], [])
     (path / 'body_ann.txt').write_text('0,0,19,29\n' * 40)
-    with_body, bob_again = open_dataset(str(path))
-    assert with_body.identity != ann.identity
-    assert bob_again.identity == bob.identity
+    (with_body, bob_again), _ = identify(open_dataset(str(path)), [])
+    assert with_body.digest != ann.digest
+    assert bob_again.digest == bob.digest
     opened = with_body.open()
     assert opened.has_body
     assert {s.body for s in opened.samples} == {Box(0, 0, 19, 29)}

@@ -15,16 +15,24 @@ import cv2
 import numpy as np
 import pytest
 
+from rgbd_kcf_tracker.batch.workers import LocalPool
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.evaluation import boxfiles, contenders, runner
 from rgbd_kcf_tracker.evaluation.contenders import Contender, OpenCvTracker
 from rgbd_kcf_tracker.evaluation.datasets import Opened, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.export import export
-from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path
+from rgbd_kcf_tracker.evaluation.jobs import (
+    RunOptions,
+    is_done,
+    meta_path,
+    thumbnails_path,
+    tracks_path,
+)
 from rgbd_kcf_tracker.evaluation.metrics import vot
-from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
+from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts, read_thumbnails
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, write_tracks
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
+from rgbd_kcf_tracker.evaluation.times import read_times
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -132,7 +140,9 @@ def test_thumbnails_stay_few_and_evenly_spread():
 def test_a_run_leaves_tracks_and_is_not_made_twice(tmp_path: Path):
     sequences, calls = [sequence('a'), sequence('b', seed=5)], []
     options = RunOptions()
-    assert runner.run(sequences, [KCF], tmp_path, options, lambda n, s: calls.append(n)) == []
+    assert (
+        runner.run(sequences, [KCF], tmp_path, options, lambda n, s, found: calls.append(n)) == []
+    )
     assert sum(calls) == 2
     path = tracks_path(tmp_path, 'kcf', 'a')
     assert path.read_text().splitlines()[0] == (
@@ -141,7 +151,7 @@ def test_a_run_leaves_tracks_and_is_not_made_twice(tmp_path: Path):
     assert len(read_tracks(path).boxes) == 8
     before = path.stat().st_mtime_ns
     calls.clear()
-    runner.run(sequences, [KCF], tmp_path, options, lambda n, s: calls.append(n))
+    runner.run(sequences, [KCF], tmp_path, options, lambda n, s, found: calls.append(n))
     assert sum(calls) == 2, 'what is done counts as progress'
     assert path.stat().st_mtime_ns == before
     runner.run(sequences, [KCF], tmp_path, RunOptions(fresh=True))
@@ -167,10 +177,9 @@ def test_a_run_is_made_again_when_anything_that_decides_it_changes(tmp_path: Pat
 
 
 def test_pictures_of_another_rate_do_not_stay(tmp_path: Path):
-    folder = tmp_path / 'thumbs' / 'a'
     for count, kept in ((8, 8), (3, 3)):
         runner.run([sequence('a', count)], [KCF], tmp_path, RunOptions())
-        assert len(list(folder.glob('*.jpg'))) == kept
+        assert len(read_thumbnails(thumbnails_path(tmp_path, 'a'))) == kept
 
 
 def test_a_run_that_was_cut_off_is_made_again(tmp_path: Path):
@@ -191,9 +200,10 @@ def test_a_failing_sequence_does_not_end_the_run(tmp_path: Path):
 def test_parallel_runs_give_the_same_and_survive_a_dying_process(tmp_path: Path):
     dying = Sequence('dying', 'moving', 'folder', die, 'dying')
     sequences = [sequence('a'), dying, sequence('b', seed=5), sequence('bad', broken_at=0)]
-    failures = runner.run(sequences, [KCF], tmp_path / 'two', RunOptions(jobs=2))
+    with LocalPool(2) as pool:
+        failures = runner.run(sequences, [KCF], tmp_path / 'two', RunOptions(), workers=pool)
     assert sorted(f.sequence for f in failures) == ['bad', 'dying']
-    assert 'process died' in next(f.reason for f in failures if f.sequence == 'dying')
+    assert 'worker died' in next(f.reason for f in failures if f.sequence == 'dying')
     runner.run([sequences[0], sequences[2]], [KCF], tmp_path / 'one', RunOptions())
     for name in ('a', 'b'):
         texts = [tracks_path(tmp_path / k, 'kcf', name).read_text() for k in ('one', 'two')]
@@ -397,4 +407,4 @@ def test_meta_tells_of_the_run(tmp_path: Path):
     runner.run([sequence('a')], [KCF], tmp_path, RunOptions())
     meta = json.loads(meta_path(tracks_path(tmp_path, 'kcf', 'a')).read_text())
     assert meta['image_size'] == [160, 120]
-    assert len(meta['milliseconds']) == 8
+    assert len(read_times(tmp_path, 'kcf', 'a')) == 8

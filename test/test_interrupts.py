@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from rgbd_kcf_tracker.batch import environment as code
 from rgbd_kcf_tracker.cli import bench
 from rgbd_kcf_tracker.cli.common import progress
 from rgbd_kcf_tracker.cli.interrupts import interrupts
@@ -243,11 +244,10 @@ def test_results_are_kept_as_long_as_what_makes_them(
 ) -> None:
     root = tmp_path / 'package'
     shutil.copytree(
-        Path(jobs.rgbd_kcf_tracker.__file__).parent, root,
+        code.ROOT, root,
         ignore=shutil.ignore_patterns('__pycache__'),
     )  # fmt: skip
-    jobs.code_digest.cache_clear()
-    before = jobs.code_digest(root)
+    before = code.code_digest(root)
     for name, kept in (
         ('evaluation/datasets/folder.py', False),
         ('evaluation/datasets/base.py', False),
@@ -261,12 +261,27 @@ def test_results_are_kept_as_long_as_what_makes_them(
     ):
         old = (root / name).read_text()
         (root / name).write_text(old + '\n# changed\n')
-        jobs.code_digest.cache_clear()
-        assert (jobs.code_digest(root) == before) == kept, name
+        assert (code.code_digest(root) == before) == kept, name
         (root / name).write_text(old)
-    for library in (jobs.np, jobs.scipy, jobs.cv2):
-        with monkeypatch.context() as patch:
-            patch.setattr(library, '__version__', '99.0')
-            jobs.code_digest.cache_clear()
-            assert jobs.code_digest(root) != before
-    jobs.code_digest.cache_clear()
+
+
+@pytest.mark.parametrize('library', ['numpy', 'scipy', 'opencv', 'python'])
+def test_results_are_kept_as_long_as_the_libraries(
+    library: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = code.environment()
+    version = code.importlib.metadata.version
+    with monkeypatch.context() as patch:
+        if library == 'opencv':
+            patch.setattr('cv2.__version__', '99.0')
+        elif library == 'python':
+            patch.setattr(code.platform, 'python_version_tuple', lambda: ('3', '99', '0'))
+        else:
+            patch.setattr(
+                code.importlib.metadata, 'version',
+                lambda name: '99.0' if name == library else version(name),
+            )  # fmt: skip
+        code.environment.cache_clear()
+        assert code.environment().digest != before.digest
+    code.environment.cache_clear()
+    assert code.environment() == before

@@ -31,7 +31,7 @@ LAYERS = (
     ('features',),
     ('metric', 'thesis'),
     ('variants',),
-    ('recordings', 'simulation', 'cameras'),
+    ('recordings', 'simulation', 'cameras', 'batch'),
     ('live', 'evaluation'),
     ('ros', 'cli', 'view', 'bench'),
 )
@@ -152,6 +152,10 @@ def test_every_library_is_declared() -> None:
         'aiohttp': ('aiohttp', 'python3-aiohttp'),
         'imageio_ffmpeg': ('imageio-ffmpeg', 'ffmpeg'),
         'psutil': ('psutil', 'python3-psutil'),
+        # Of clusters and benches, where pip is at hand; rosdep has no key for them.
+        'distributed': ('distributed', None),
+        'pyarrow': ('pyarrow', None),
+        'threadpoolctl': ('threadpoolctl', None),
     }
     setup = (ROOT / 'setup.py').read_text(encoding='utf-8')
     manifest = (ROOT / 'package.xml').read_text(encoding='utf-8')

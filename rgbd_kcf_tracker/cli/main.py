@@ -20,7 +20,9 @@ else:
     Protocol = object
 
 PROGRAM = 'rgbd-kcf'
-SUBCOMMANDS = ('track', 'evaluate', 'convert', 'info', 'simulate', 'view', 'explain', 'bench')
+SUBCOMMANDS = (
+    'track', 'evaluate', 'sweep', 'convert', 'info', 'simulate', 'view', 'explain', 'bench',
+)  # fmt: skip
 
 EXIT_USAGE = 2
 

@@ -9,10 +9,12 @@ import argparse
 import sys
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rgbd_kcf_tracker.cli import track_many
 from rgbd_kcf_tracker.cli.common import (
     SOURCE_HELP,
     Warnings,
@@ -26,6 +28,7 @@ from rgbd_kcf_tracker.cli.common import (
 from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError
 
 if TYPE_CHECKING:
+    from rgbd_kcf_tracker.evaluation.metrics import Measures
     from rgbd_kcf_tracker.frame import Frame
     from rgbd_kcf_tracker.geometry import Box
     from rgbd_kcf_tracker.recordings import Recording
@@ -41,7 +44,11 @@ ONLY = 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
-    parser.add_argument('source', metavar='SOURCE', help=SOURCE_HELP)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = track_many.EPILOG
+    parser.add_argument(
+        'source', nargs='*', metavar='SOURCE', help=f'{SOURCE_HELP}; several, and globs, see below'
+    )
     parser.add_argument(
         '--init',
         metavar='X,Y,W,H',
@@ -82,21 +89,77 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--bag', metavar='FILE.mcap', help="the frames with the tracker's topics beside them"
     )
     add_overwrite_option(output, 'files that are there')
+    track_many.add_options(parser)
     add_reading_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Track, write, and print a summary."""
+    if track_many.is_asked(args):
+        return track_many.run(args)
+    (args.source,) = args.source
+    print(follow(args), file=sys.stderr if args.output == '-' else sys.stdout)
+    return 0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came out of one recording.
+
+    Attributes:
+        recording: its name.
+        variant: the tracker.
+        frames: that were read.
+        targets: ids that were given; None where one target is followed.
+        states: frames (and targets) by state.
+        measures: against the ground truth, None where that is of nobody or somebody else.
+        rate: frames a second.
+        written: files.
+        warnings: what was odd.
+    """
+
+    recording: str
+    variant: str
+    frames: int
+    targets: int | None
+    states: Mapping[str, int]
+    measures: Measures | None
+    rate: float
+    written: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def __str__(self) -> str:
+        states = ', '.join(f'{count} {state}' for state, count in self.states.items())
+        line = f'{self.recording}: {self.frames} frames with {self.variant}: '
+        if self.targets is not None:
+            line += f'{self.targets} targets: '
+        line += states or 'nobody'
+        if self.measures is not None:
+            m = self.measures
+            line += f'; success {m.success:.3f}, IoU {m.iou:.3f}, strangers {m.strangers:.3f} '
+            line += 'against the ground truth'
+        line += f'; {self.rate:.0f} frames/s'
+        return f'{line}; wrote {", ".join(self.written)}' if self.written else line
+
+
+def follow(args: argparse.Namespace, watched: bool = True) -> Outcome:
+    """Follow targets through one recording.
+
+    Args:
+        args: the options, ``source`` being one path.
+        watched: show a bar and warnings as they come.
+    """
     from rgbd_kcf_tracker.recordings import open_recording
     from rgbd_kcf_tracker.track import require_inside
 
     _check_outputs(args)
-    follower = _make_follower(args)
+    follower = make_follower(args)
     given = [parse_box(text) for text in args.init]
     with open_recording(args.source, read_options(args)) as recording:
         start, end = _frame_range(args, recording)
         warnings = Warnings(recording.warnings)
-        warnings.show()
+        if watched:
+            warnings.show()
         given, first = _first_boxes(args, given, recording, start, end)
         counts: Counter[str] = Counter()
         boxes: list[Box | None] = []
@@ -105,7 +168,9 @@ def run(args: argparse.Namespace) -> int:
         spent = 0.0
         sinks: _Sinks | None = None
         with ExitStack() as stack:
-            frames = progress(recording.frames(start, end), end - start, NAME)
+            frames: Iterable[Frame] = recording.frames(start, end)
+            if watched:
+                frames = progress(frames, end - start, NAME)
             for number, frame in enumerate(frames, start=start):
                 if sinks is None:
                     for box in given if number == first else ():
@@ -121,40 +186,40 @@ def run(args: argparse.Namespace) -> int:
                 if not follower.several:
                     boxes.append(tracks[ONLY].box)
                 sinks.write(number, frame, tracks)
-                warnings.show()
-        success = ''
+                if watched:
+                    warnings.show()
+        measures = None
         if not follower.several:
-            success = _success(boxes[first - start :], recording, first, given[0])
-    rate = read / spent if spent > 0 else 0.0
-    states = ', '.join(f'{count} {state}' for state, count in counts.items())
-    line = f'{recording.name}: {read} frames with {follower.variant}: '
-    if follower.several:
-        line += f'{len(ids)} targets: '
-    line += f'{states or "nobody"}{success}; {rate:.0f} frames/s'
-    if sinks is not None and sinks.written:
-        line += f'; wrote {", ".join(sinks.written)}'
-    print(line, file=sys.stderr if args.output == '-' else sys.stdout)
-    return 0
+            measures = _measures(boxes[first - start :], recording, first, given[0])
+        return Outcome(
+            recording.name,
+            follower.variant,
+            read,
+            len(ids) if follower.several else None,
+            dict(counts),
+            measures,
+            read / spent if spent > 0 else 0.0,
+            tuple(sinks.written) if sinks is not None else (),
+            tuple(recording.warnings),
+        )
 
 
-def _success(boxes: list[Box | None], recording: Recording, first: int, start: Box) -> str:
+def _measures(
+    boxes: list[Box | None], recording: Recording, first: int, start: Box
+) -> Measures | None:
     """How the boxes compare with the ground truth, if that is of the same target."""
     if recording.groundtruth is None:
-        return ''
+        return None
     truth = recording.groundtruth[first : first + len(boxes)]
     if len(truth) < 2 or truth[0] is None or truth[0].iou(start) < _SAME_TARGET_IOU:
-        return ''
+        return None
     from rgbd_kcf_tracker.evaluation.metrics import measure_boxes
 
     body = recording.groundtruth_body
     bodies = None if body is None else body[first : first + len(truth)]
     if bodies is not None and len(bodies) < len(truth):
         bodies = None
-    measures = measure_boxes(boxes[: len(truth)], truth, bodies)
-    return (
-        f'; success {measures.success:.3f}, IoU {measures.iou:.3f}, '
-        f'strangers {measures.strangers:.3f} against the ground truth'
-    )
+    return measure_boxes(boxes[: len(truth)], truth, bodies)
 
 
 class _Sinks:
@@ -263,7 +328,12 @@ def _several(args: argparse.Namespace) -> bool:
     return bool(args.all) or len(args.init) > 1
 
 
-def _make_follower(args: argparse.Namespace) -> _One | _Several:
+def make_follower(args: argparse.Namespace) -> _One | _Several:
+    """What follows the targets that were asked for.
+
+    Raises:
+        ParameterError: for an unknown variant or parameter, or options that do not go together.
+    """
     import rgbd_kcf_tracker
     from rgbd_kcf_tracker.parameters import with_overrides
     from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters

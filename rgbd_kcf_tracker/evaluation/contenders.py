@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -37,22 +38,29 @@ class Contender:
         kind: 'variant', 'opencv' or 'boxes'.
         target: the variant, OpenCV's tracker, or the pattern of the files of boxes.
         overrides: parameters that differ from the defaults, as text.
+        files: digests of files of boxes by sequence, as far as they are known.
     """
 
     name: str
     kind: str
     target: str
     overrides: tuple[tuple[str, str], ...] = ()
+    files: tuple[tuple[str, str], ...] = field(default=(), compare=False)
 
     @property
     def identity(self) -> str:
         """Changes whenever the tracker would behave otherwise by its parameters."""
-        values: Any = self.target
+        values: Any = ''
         if self.kind == 'variant':
             values = dataclasses.asdict(self.parameters())
         elif self.kind == 'opencv':
             values = cv2.__version__
-        return json.dumps([self.kind, self.target, values], sort_keys=True)
+        return json.dumps([self.kind, self.source, values], sort_keys=True)
+
+    @property
+    def source(self) -> str:
+        """The variant, or OpenCV's tracker; of boxes nothing: where files lie is of a machine."""
+        return '' if self.kind == 'boxes' else self.target
 
     def make(self) -> Tracker:
         """A new tracker.
@@ -158,7 +166,7 @@ def boxes(text: str) -> Contender:
         raise ParameterError(
             f'boxes {text!r}: give NAME=FOLDER or NAME=PATTERN with {{sequence}} in it'
         )
-    return Contender(name, 'boxes', pattern)
+    return Contender(name, 'boxes', os.path.abspath(pattern))
 
 
 def switches(base: Contender) -> list[str]:

@@ -13,7 +13,6 @@ In Python::
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field
@@ -29,7 +28,9 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
+from rgbd_kcf_tracker.evaluation.passes import trace
 from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
+from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.recordings.mot import Sightings, mot_text, read_mot
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
@@ -82,7 +83,6 @@ class EveryoneResult:
     scenario: str
     frames: int
     scores: Everyone
-    milliseconds: tuple[float, ...] = ()
 
 
 @dataclass(eq=False)
@@ -117,7 +117,7 @@ class EveryonePass:
         except RgbdKcfError as error:
             self.error = f'frame {len(self.tracks)}: {error}'
         except Exception:
-            self.error = f'frame {len(self.tracks)}: {traceback.format_exc().strip()}'
+            self.error = f'frame {len(self.tracks)}: {trace()}'
 
 
 def follow(targets: Targets, samples: Iterable[Sample]) -> Followed:
@@ -181,6 +181,11 @@ class _Truth:
             [float(p.counts) for p in people],
             [np.nan if p.share is None else p.share for p in people],
         )
+
+
+def times_name(sequence: str) -> str:
+    """What times are kept under: a single target's sequence may have the same name."""
+    return f'everyone/{sequence}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,9 +277,9 @@ def run(
                 'frames': len(truth.numbers),
                 'stamps_ns': truth.stamps_ns,
                 'bodies': bodies is not None,
-                'milliseconds': [round(ms, 3) for ms in one.milliseconds],
             },
         )
+        write_times(folder, contender.name, times_name(sequence.name), one.milliseconds)
     return failed
 
 
@@ -305,11 +310,10 @@ def read(folder: Path, sequence: Sequence, tracker: str) -> EveryoneResult:
         row = {key: i for i, key in enumerate(zip(truth.frames, truth.ids, strict=True))}
         for key, box in zip(zip(whole.frames, whole.ids, strict=True), whole.boxes, strict=True):
             bodies[row[key]] = box
-    followed = Followed(truth, bodies, tracks, tuple(meta['milliseconds']))
+    followed = Followed(truth, bodies, tracks)
     return EveryoneResult(
-        tracker, sequence.name, sequence.scenario, int(meta['frames']), followed.score(),
-        followed.milliseconds,
-    )  # fmt: skip
+        tracker, sequence.name, sequence.scenario, int(meta['frames']), followed.score()
+    )
 
 
 def _from_file(

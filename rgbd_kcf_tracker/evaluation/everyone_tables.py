@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, mean
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
@@ -39,27 +37,24 @@ def overview(results: Sequence[EveryoneResult]) -> Table:
     rows = []
     for tracker in trackers:
         own = [r for r in results if r.tracker == tracker]
-        spent = [ms for r in own for ms in r.milliseconds[1:]]
         rows.append(
             (
                 tracker,
                 len(own),
                 *_shares(mean(r.scores for r in own)),
                 *(sum(int(getattr(r.scores, name)) for r in own) for name, _ in COUNTS),
-                float(np.median(spent)) if spent else None,
-                float(np.percentile(spent, 95)) if spent else None,
             )
         )
     return Table(
         'everyone',
         'Everyone: every tracker',
-        ('tracker', 'recordings', *_headings(), 'median ms', 'p95 ms'),
+        ('tracker', 'recordings', *_headings()),
         tuple(rows),
         note='Shares are means over recordings, each counting once; counts are sums. IDF1, MOTA '
         'and counts at IoU 0.5; HOTA over IoU 0.05 to 0.95. People of whom little shows are '
         'neither hit nor miss. Strangers: of all boxes, those on something else than the person '
         'that their id was first on. Returns: of the times a person was back for five frames or '
-        'more, those in which the id from before is on them again. Times are of one update.',
+        'more, those in which the id from before is on them again.',
     )
 
 

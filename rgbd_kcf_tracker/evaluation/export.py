@@ -15,6 +15,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path
 from rgbd_kcf_tracker.evaluation.store import read_json, read_tracks, slug
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
+from rgbd_kcf_tracker.evaluation.times import read_times
 
 
 def export(
@@ -41,13 +42,14 @@ def export(
             path = tracks_path(folder, contender.name, sequence.name)
             if not is_done(folder, sequence, contender, options):
                 continue
-            tracks, meta = read_tracks(path), read_json(meta_path(path))
+            tracks = read_tracks(path)
             boxes = tracks.boxes + np.array([sequence.origin, sequence.origin, 0, 0])
             name = slug(sequence.name)
             if form == 'princeton':
                 write_princeton(place / f'{name}.txt', boxes)
                 continue
-            ms = [float(v) for v in meta['milliseconds']] or [0.0] * len(boxes)
+            meta = read_json(meta_path(path))
+            ms = read_times(folder, contender.name, sequence.name) or [0.0] * len(boxes)
             write_vot(place / 'longterm', name, boxes, tracks.scores, ms)
             if 'short_term' in meta:
                 run = meta['short_term']

@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import traceback
+import platform
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
-import scipy
-
 import rgbd_kcf_tracker
-from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.batch.content import MISSING, files_digest
+from rgbd_kcf_tracker.batch.environment import environment
+from rgbd_kcf_tracker.batch.transport import Packed, packed
+from rgbd_kcf_tracker.errors import RgbdKcfError, WorkersError
 from rgbd_kcf_tracker.evaluation import boxfiles, everyone
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import (
@@ -32,37 +30,20 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     with_intrinsics,
     without_depth,
 )
-from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts
+from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
     write_json,
     write_tracks,
     write_truth,
 )
+from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
-_FORMAT = 2
-"""Of what a run leaves; another one is not read, but run again."""
 
-# What makes no frame and no track. All else is part of the digest, also what will be added.
-_ELSEWHERE = ('bench', 'cli', 'live', 'ros', 'view')
-_MEASURING = 'evaluation'
-_RUNNING = ('datasets', 'boxfiles.py', 'contenders.py', 'everyone.py', 'jobs.py', 'passes.py')
-"""What of the evaluation makes frames and tracks; the rest measures and shows them."""
-
-
-@cache
-def code_digest(root: Path = Path(rgbd_kcf_tracker.__file__).parent) -> str:
-    """Digest of the code that makes frames and tracks, and of the libraries that it calls."""
-    versions = rgbd_kcf_tracker.__version__, np.__version__, scipy.__version__, cv2.__version__
-    digest = hashlib.sha256(' '.join(versions).encode())
-    for path in sorted(root.rglob('*.py')):
-        parts = path.relative_to(root).parts
-        if parts[0] in _ELSEWHERE or (parts[0] == _MEASURING and parts[1] not in _RUNNING):
-            continue
-        digest.update('/'.join(parts).encode() + b'\0' + path.read_bytes())
-    return digest.hexdigest()[:16]
+def _environment_digest() -> str:
+    return environment().digest
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,19 +54,18 @@ class RunOptions:
         rate_hz: thin recordings out to this rate; None leaves them.
         use_depth: False drops the depth images.
         short_term: also run VOT's protocol with re-initialisation.
-        jobs: parallel processes.
         fresh: run again what is already there.
         intrinsics: of recordings, instead of their own; None leaves them.
-        code: digest of the code; part of every run's key, the same in all processes of a run.
+        code: digest of code and libraries; part of every run's key, the same in all processes of
+            a run.
     """
 
     rate_hz: float | None = None
     use_depth: bool = True
     short_term: bool = False
-    jobs: int = 1
     fresh: bool = False
     intrinsics: Intrinsics | None = None
-    code: str = field(default_factory=code_digest)
+    code: str = field(default_factory=_environment_digest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +79,19 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One sequence and the trackers that have not run on it yet."""
+    """One sequence and the trackers that have not run on it yet.
+
+    Attributes:
+        sequence: opened where the job runs.
+        contenders: that run on it.
+        options: how.
+        folder: where it runs, for what it makes.
+    """
 
     sequence: Sequence
     contenders: tuple[Contender, ...]
-    folder: Path
     options: RunOptions
+    folder: Path = Path()
 
 
 def truth_path(folder: Path, sequence: str) -> Path:
@@ -118,25 +105,35 @@ def tracks_path(folder: Path, tracker: str, sequence: str) -> Path:
 
 
 def meta_path(tracks: Path) -> Path:
-    """Key, times and the short-term run beside a file of tracks; written last, so it vouches."""
+    """Key and the short-term run beside a file of tracks; written last, so it vouches."""
     return tracks.with_suffix('.json')
+
+
+def thumbnails_path(folder: Path, sequence: str) -> Path:
+    """Where the small pictures of a sequence lie, all in one file."""
+    return folder / 'thumbs' / f'{slug(sequence)}.zip'
 
 
 def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> str:
     """What decides the outcome of a run, as a short text."""
     extra = ''
     if contender.kind == 'boxes':
-        try:
-            stat = boxfiles.find_file(contender.target, sequence).stat()
-            extra = f'{stat.st_size}:{stat.st_mtime_ns}'
-        except RgbdKcfError:
-            extra = 'missing'
+        extra = dict(contender.files).get(sequence.name) or boxes_digest(sequence, contender)
     parts = [
-        sequence.identity, contender.identity, extra, options.code,
+        sequence.identity, sequence.digest or files_digest(sequence.content),
+        contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,
-        repr(options.intrinsics), _FORMAT,
+        repr(options.intrinsics),
     ]  # fmt: skip
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
+
+
+def boxes_digest(sequence: Sequence, contender: Contender) -> str:
+    """Of the file that holds a contender's boxes."""
+    try:
+        return files_digest([boxfiles.find_file(contender.target, sequence)])
+    except RgbdKcfError:
+        return MISSING
 
 
 def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
@@ -155,14 +152,24 @@ def is_done(folder: Path, sequence: Sequence, contender: Contender, options: Run
     return bool(meta.get('key') == run_key(sequence, contender, options))
 
 
-def run_job(job: Job) -> list[Failure]:
+def run_job(job: Job) -> Packed[list[Failure]]:
     """Run one sequence; whatever goes wrong is returned, not raised."""
+    return packed(lambda folder: _run_safely(replace(job, folder=folder)))
+
+
+def _run_safely(job: Job) -> list[Failure]:
     try:
+        own = environment()
+        if job.options.code != own.digest:  # of a worker that came later, say
+            raise WorkersError(
+                f'{platform.node()} has another rgbd_kcf_tracker ({own.version}) or other '
+                'libraries than this run: install the same on every machine'
+            )
         return _run_sequence(job)
     except RgbdKcfError as error:
         return [Failure(job.sequence.name, '', str(error))]
     except Exception:
-        return [Failure(job.sequence.name, '', traceback.format_exc().strip())]
+        return [Failure(job.sequence.name, '', trace())]
 
 
 def _run_sequence(job: Job) -> list[Failure]:
@@ -194,7 +201,7 @@ def _run_sequence(job: Job) -> list[Failure]:
         truth_path(job.folder, sequence.name),
         stamps, [s[1] for s in samples], body, [s[3] for s in samples], [s[4] for s in samples],
     )  # fmt: skip
-    _write_thumbnails(job.folder / 'thumbs' / slug(sequence.name), thumbnails)
+    write_atomically(thumbnails_path(job.folder, sequence.name), thumbnails.archive())
 
     failures = []
     for contender in job.contenders:
@@ -211,6 +218,7 @@ def _run_sequence(job: Job) -> list[Failure]:
             _meta(job, contender, one, restart, opened)
             | {'image_size': size, 'thumbnail_scale': thumbnails.scale},
         )
+        write_times(job.folder, contender.name, sequence.name, one.milliseconds)
     return failures
 
 
@@ -220,15 +228,6 @@ def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
     keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
     failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
     return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]
-
-
-def _write_thumbnails(folder: Path, thumbnails: Thumbnails) -> None:
-    pictures = {f'{index:06d}.jpg': data for index, data in thumbnails.pictures.items()}
-    for old in folder.glob('*.jpg'):  # of the same sequence at another rate, say
-        if old.name not in pictures:
-            old.unlink(missing_ok=True)
-    for name, data in pictures.items():
-        write_atomically(folder / name, data)
 
 
 def _from_file(contender: Contender, sequence: Sequence, opened: Opened, frames: int) -> OnePass:
@@ -258,7 +257,6 @@ def _meta(
         'categories': dict(sequence.categories),
         'version': rgbd_kcf_tracker.__version__,
         'warnings': list(opened.warnings),
-        'milliseconds': [round(ms, 3) for ms in one.milliseconds],
     }
     if restart is not None:
         run = restart.run()

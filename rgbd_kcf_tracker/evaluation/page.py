@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,9 @@ from rgbd_kcf_tracker.evaluation.store import read_tracks, read_truth
 
 STRIPS = 3
 """Sequences shown as best, and as worst."""
+
+FIGURES = 100
+"""Sequences of which the page shows the error over time: more, and no browser opens it."""
 
 TEMPLATE = 'report.html.j2'
 
@@ -36,7 +38,6 @@ def render(content: Mapping[str, Any]) -> str:
     return environment.get_template(TEMPLATE).render(
         **content,
         version=rgbd_kcf_tracker.__version__,
-        date=datetime.now(timezone.utc).strftime('%Y-%m-%d %H:%M UTC'),
     )
 
 
@@ -75,10 +76,19 @@ def strip_figures(
     return result
 
 
-def sequence_figures(measured: Measured, palette: Mapping[str, str]) -> list[dict[str, str]]:
-    """Error over time of every sequence."""
+def sequence_figures(
+    measured: Measured, main: str, palette: Mapping[str, str]
+) -> list[dict[str, str]]:
+    """Error over time of every sequence; of thousands, of those that the main tracker is worst on.
+
+    In the order of the sequences.
+    """
+    scored = [(m.success, s) for s in measured.sequences if (m := measured.of(main, s)) is not None]
+    drawn = set(measured.sequences)
+    if len(drawn) > FIGURES:
+        drawn = {s for _, s in sorted(scored)[:FIGURES]}
     result = []
-    for sequence in measured.sequences:
+    for sequence in [s for s in measured.sequences if s in drawn]:
         own = [r for t in measured.trackers if (r := measured.result(t, sequence)) is not None]
         result.append({'title': sequence, 'data': uri(plots.sequence_plot(own, palette))})
     return result

@@ -8,15 +8,19 @@ The sequence is read (or rendered) once, and every tracker gets the same frames.
 
 from __future__ import annotations
 
+import io
 import math
 import time
 import traceback
+import zipfile
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.evaluation.metrics import vot
@@ -27,6 +31,12 @@ from rgbd_kcf_tracker.track import Track, Tracker, TrackState
 THUMBNAIL_WIDTH = 320
 THUMBNAILS = 24
 _NO_BOX = Track(None, TrackState.IDLE)
+
+
+def trace() -> str:
+    """Where the exception that is handled came from; the same wherever the package lies."""
+    home = f'{Path(rgbd_kcf_tracker.__file__).parent.parent}/'
+    return traceback.format_exc().strip().replace(home, '')
 
 
 @dataclass(eq=False)
@@ -54,7 +64,7 @@ class OnePass:
         except RgbdKcfError as error:
             self.error = f'frame {len(self.tracks)}: {error}'
         except Exception:
-            self.error = f'frame {len(self.tracks)}: {traceback.format_exc().strip()}'
+            self.error = f'frame {len(self.tracks)}: {trace()}'
 
     def _step(self, tracker: Tracker, sample: Sample) -> None:
         start = not self.tracks
@@ -151,3 +161,20 @@ class Thumbnails:
     def pictures(self) -> dict[int, bytes]:
         """JPEG data by frame index."""
         return self._kept
+
+    def archive(self) -> bytes:
+        """The pictures as one zip file, which depends on them alone."""
+        data = io.BytesIO()
+        with zipfile.ZipFile(data, 'w', zipfile.ZIP_STORED) as file:
+            for index, picture in self._kept.items():
+                file.writestr(zipfile.ZipInfo(f'{index:06d}.jpg'), picture)
+        return data.getvalue()
+
+
+def read_thumbnails(path: Path) -> dict[int, bytes]:
+    """JPEG data by frame index out of a :meth:`Thumbnails.archive`; empty where there is none."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            return {int(Path(name).stem): file.read(name) for name in sorted(file.namelist())}
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return {}

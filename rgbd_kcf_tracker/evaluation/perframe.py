@@ -10,9 +10,9 @@ with each other, and anybody can compute them again.
 from __future__ import annotations
 
 import csv
-import io
+import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -31,11 +31,11 @@ from rgbd_kcf_tracker.evaluation.store import (
     read_tracks,
     read_truth,
 )
-from rgbd_kcf_tracker.recordings.outputs import write_atomically
+from rgbd_kcf_tracker.recordings.outputs import moved_into_place
 
 HEADER = (
     'tracker', 'sequence', 'frame', 'stamp_ns', 'there', 'said', 'iou', 'dx_px', 'dy_px', 'ratio',
-    'score', 'visible_fraction', 'ms', 'judged',
+    'score', 'visible_fraction', 'judged',
 )  # fmt: skip
 
 
@@ -49,7 +49,6 @@ class Result:
         stamps_ns: one per frame.
         frames: the comparison with the truth, the first frame included.
         fraction: ``(N,)`` visible share, NaN where unknown.
-        milliseconds: ``(N,)`` time of each call, NaN where unknown (boxes from files).
         judged: ``(N,)`` False where the truth leaves open what is right: the frame does not count.
     """
 
@@ -58,7 +57,6 @@ class Result:
     stamps_ns: tuple[int, ...]
     frames: Comparison
     fraction: Array
-    milliseconds: Array
     judged: Mask
 
     @property
@@ -149,15 +147,9 @@ def _collect_one(
         size,
         float(meta['thumbnail_scale']),
     )
-    count = len(truth.stamps_ns)
-    ms = np.full(count, np.nan)
-    times = meta['milliseconds'][:count]
-    ms[: len(times)] = times
     frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
     collected.results.append(
-        Result(
-            contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, ms, truth.judged
-        )
+        Result(contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, truth.judged)
     )
     if 'short_term' in meta:
         run = meta['short_term']
@@ -168,23 +160,24 @@ def _collect_one(
 
 def write_per_frame(path: Path, results: Iterable[Result]) -> None:
     """Write the file; numbers to six digits, empty cells where there is none."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator='\n')
-    writer.writerow(HEADER)
-    for r in results:
-        f = r.frames
-        ratio = f.ratio
-        for i, stamp in enumerate(r.stamps_ns):
-            numbers = (f.overlap[i], *f.offset[i], ratio[i], f.score[i], r.fraction[i])
-            writer.writerow(
-                (
-                    r.tracker, r.sequence, i, stamp, int(f.there[i]), int(f.said[i]),
-                    *('' if math.isnan(v) else f'{v:.6g}' for v in numbers),
-                    '' if math.isnan(r.milliseconds[i]) else f'{r.milliseconds[i]:.2f}',
-                    int(r.judged[i]),
-                )
-            )  # fmt: skip
-    write_atomically(path, text.getvalue())
+    with (
+        moved_into_place(path) as temporary,
+        temporary.open('w', encoding='utf-8', newline='') as file,
+    ):
+        writer = csv.writer(file, lineterminator='\n')
+        writer.writerow(HEADER)
+        for r in results:
+            f = r.frames
+            ratio = f.ratio
+            for i, stamp in enumerate(r.stamps_ns):
+                numbers = (f.overlap[i], *f.offset[i], ratio[i], f.score[i], r.fraction[i])
+                writer.writerow(
+                    (
+                        r.tracker, r.sequence, i, stamp, int(f.there[i]), int(f.said[i]),
+                        *('' if math.isnan(v) else f'{v:.6g}' for v in numbers),
+                        int(r.judged[i]),
+                    )
+                )  # fmt: skip
 
 
 def read_per_frame(path: Path) -> list[Result]:
@@ -193,35 +186,39 @@ def read_per_frame(path: Path) -> list[Result]:
     Raises:
         DatasetError: naming the line that is none.
     """
-    rows: dict[tuple[str, str], list[list[str]]] = {}
+    results: list[Result] = []
     try:
         with path.open(encoding='utf-8', newline='') as file:
             reader = csv.reader(file)
             if tuple(next(reader, ())) != HEADER:
                 raise DatasetError(f'{path}, line 1: the header must be {",".join(HEADER)}')
-            for number, row in enumerate(reader, start=2):
-                if len(row) != len(HEADER):
-                    raise DatasetError(
-                        f'{path}, line {number}: {len(row)} cells, not {len(HEADER)}'
-                    )
-                rows.setdefault((row[0], row[1]), []).append(row)
+            # One run after the other, so that the text of only one is held.
+            for _, own in itertools.groupby(_checked(reader, path), key=lambda row: row[:2]):
+                results.append(_result(path, list(own)))
     except OSError as error:
         raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
-    results = []
-    for (tracker, sequence), own in rows.items():
-        try:
-            stamps = tuple(int(row[3]) for row in own)
-            table = np.array([[float(v) if v else np.nan for v in row[4:]] for row in own])
-        except ValueError as error:
-            raise DatasetError(f'{path}, {tracker} on {sequence}: {error}') from None
-        frames = Comparison(
-            said=table[:, 1] == 1,
-            there=table[:, 0] == 1,
-            overlap=table[:, 2],
-            offset=table[:, 3:5],
-            score=table[:, 6],
-        )
-        results.append(
-            Result(tracker, sequence, stamps, frames, table[:, 7], table[:, 8], table[:, 9] != 0)
-        )
     return results
+
+
+def _checked(rows: Iterable[list[str]], path: Path) -> Iterator[list[str]]:
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(HEADER):
+            raise DatasetError(f'{path}, line {number}: {len(row)} cells, not {len(HEADER)}')
+        yield row
+
+
+def _result(path: Path, rows: list[list[str]]) -> Result:
+    tracker, sequence = rows[0][:2]
+    try:
+        stamps = tuple(int(row[3]) for row in rows)
+        table = np.array([[float(v) if v else np.nan for v in row[4:]] for row in rows])
+    except ValueError as error:
+        raise DatasetError(f'{path}, {tracker} on {sequence}: {error}') from None
+    frames = Comparison(
+        said=table[:, 1] == 1,
+        there=table[:, 0] == 1,
+        overlap=table[:, 2],
+        offset=table[:, 3:5],
+        score=table[:, 6],
+    )
+    return Result(tracker, sequence, stamps, frames, table[:, 7], table[:, 8] != 0)

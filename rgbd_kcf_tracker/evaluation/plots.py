@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE, Reliability
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
+from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Effect
 from rgbd_kcf_tracker.evaluation.perframe import Result
 from rgbd_kcf_tracker.evaluation.tables import REAL, SIMULATED, Scored
 
@@ -249,3 +250,22 @@ def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
 def _mean(curves: Sequence[Array], size: int) -> Array:
     mean: Array = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
     return mean
+
+
+def effect_plots(
+    effects: Sequence[tuple[str, Sequence[str], Effect]], measure: str, scale: float
+) -> bytes:
+    """Mean score at each value of each parameter, with its interval over sequences."""
+    columns = min(4, len(effects))
+    rows = -(-len(effects) // columns)
+    figure = plot_style.figure(max(4.5, 3.4 * columns), 2.9 * rows)
+    for index, (name, labels, effect) in enumerate(effects):
+        axes = figure.add_subplot(rows, columns, index + 1)
+        xs = np.arange(len(labels))
+        axes.fill_between(xs, scale * effect.low, scale * effect.high, color='#cfe2f3', lw=0)
+        axes.plot(xs, scale * effect.means, color=plot_style.PALETTE[0], marker='o', ms=4, lw=1.6)
+        axes.set_xticks(xs, labels, rotation=30, ha='right')
+        axes.set(title=name, ylabel=measure if index % columns == 0 else '')
+        axes.title.set_fontsize(9)
+        plot_style.tidy(axes)
+    return plot_style.png(figure)

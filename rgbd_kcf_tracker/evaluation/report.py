@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.evaluation import (
     page,
     plot_style,
     plots,
+    sweep_tables,
     tables,
     thesis_tables,
 )
@@ -36,6 +37,7 @@ PAGE = 'index.html'
 PER_FRAME = 'per_frame.csv'
 REPORT_NAMES = frozenset(
     {PAGE, PER_FRAME, 'pairs.csv', 'failures.txt', 'report.json', 'tables.md'}
+    | {'runs.jsonl', 'times', 'times.csv', 'parts', 'settings.csv'}
     | {'results', 'submission', 'tables', 'thumbs', 'truth'}
 )
 """What a report folder holds, whole or begun."""
@@ -48,14 +50,12 @@ class Heading:
     Attributes:
         datasets: as the user gave them.
         options: in words.
-        command: that was typed, or ''.
         ablated: names of variants whose ingredients were switched off in turn.
         eao_lengths: sequence lengths over which EAO is averaged, None for the typical ones.
     """
 
     datasets: tuple[str, ...]
     options: str = 'as they are'
-    command: str = ''
     ablated: tuple[str, ...] = ()
     eao_lengths: tuple[int, int] | None = None
 
@@ -115,7 +115,7 @@ def write_report(
         'scenario_plot': page.uri(plots.scenario_plot(measured, main)),
         'long_term_plot': page.uri(plots.long_term_plot(long_curves)),
         'strips': page.strip_figures(folder, measured, main, palette),
-        'sequence_plots': page.sequence_figures(measured, palette),
+        'sequence_plots': page.sequence_figures(measured, main, palette),
         'unmeasured': collected.unmeasured,
         'main': main,
     }
@@ -194,6 +194,41 @@ def write_identity_report(
     return every[0]
 
 
+def write_sweep_report(
+    folder: Path,
+    found: sweep_tables.Found,
+    failures: Sequence[Failure],
+    heading: Heading,
+    frames: Mapping[str, int],
+) -> list[Table]:
+    """Write the report of a sweep.
+
+    Args:
+        folder: of the report.
+        found: what came out.
+        failures: runs that failed.
+        heading: what stands at the top.
+        frames: of each sequence, those held out included.
+
+    Returns:
+        Its tables, for printing.
+    """
+    _write_failures(folder / 'failures.txt', failures)
+    every = sweep_tables.all_tables(found)
+    _write_tables(folder, every)
+    write_atomically(folder / 'settings.csv', sweep_tables.settings_csv(found))
+    contenders = [found.default.contender, *(found.settings[i].contender for i in found.finalists)]
+    write_json(folder / 'report.json', _numbers(every, contenders, failures, heading), indent=1)
+    effects = [(axis.info.name, *sweep_tables.effect(found, axis)) for axis in found.axes]
+    shown = f'{found.measure} %' if found.scale == 100 else f'{found.measure} px'
+    content = {
+        'sweep': every,
+        'sweep_plot': page.uri(plots.effect_plots(effects, shown, found.scale)),
+    } | _head(heading, failures, {}, frames)
+    write_atomically(folder / PAGE, page.render(content))
+    return every
+
+
 def main_tracker(
     measured: Sequence[str], contenders: Sequence[Contender], ablated: Sequence[str] = ()
 ) -> str:
@@ -222,7 +257,6 @@ def _head(
         'title': f'Trackers on {_short(heading.datasets)}',
         'dataset': ', '.join(heading.datasets),
         'options': heading.options,
-        'command': heading.command,
     }
 
 
@@ -259,7 +293,7 @@ def _numbers(
         'datasets': heading.datasets,
         'options': heading.options,
         'trackers': {
-            c.name: {'kind': c.kind, 'target': c.target, **dict(c.overrides)} for c in contenders
+            c.name: {'kind': c.kind, 'target': c.source, **dict(c.overrides)} for c in contenders
         },
         'tables': {
             t.key: {'title': t.title, 'columns': t.columns, 'rows': t.rows, 'note': t.note}

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.evaluation.jobs import thumbnails_path
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
-from rgbd_kcf_tracker.evaluation.store import slug
-from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
+from rgbd_kcf_tracker.evaluation.passes import read_thumbnails
 from rgbd_kcf_tracker.recordings.images import decode_color_bytes
 
 FRAMES = 8
@@ -51,16 +51,15 @@ def strip(
         main: the tracker drawn on top of the others.
         interesting: ``(N,)`` frames that should be among those shown (occlusion, errors).
     """
-    pictures = sorted((folder / 'thumbs' / slug(sequence)).glob('*.jpg'))
-    indices = np.array([int(p.stem) for p in pictures if int(p.stem) < len(truth)], np.int64)
+    pictures = read_thumbnails(thumbnails_path(folder, sequence))
+    indices = np.array([i for i in pictures if i < len(truth)], np.int64)
     if not len(indices):
         return None
     scale = scale * ENLARGED
     tiles = []
     for i in choose(indices, interesting):
-        path = folder / 'thumbs' / slug(sequence) / f'{i:06d}.jpg'
-        try:  # cv2.imread dies of a name that is no UTF-8
-            picture = decode_color_bytes(memoryview(read_file(path, MAX_IMAGE)))
+        try:
+            picture = decode_color_bytes(memoryview(pictures[i]))
         except RgbdKcfError:
             continue
         size = (round(picture.shape[1] * ENLARGED), round(picture.shape[0] * ENLARGED))

@@ -77,26 +77,21 @@ def overview(measured: Measured) -> Table:
     for tracker in measured.trackers:
         m = measured.mean(tracker)
         low, high = bootstrap_interval(measured.values(tracker, 'success'))
-        ms = np.concatenate([r.milliseconds[1:] for r in measured.results if r.tracker == tracker])
-        ms = ms[~np.isnan(ms)]
         rows.append(
             (
                 tracker,
                 *(scaled(getattr(m, c.name), c.scale) for c in OVERVIEW[:1]),
                 '' if math.isnan(low) else f'{100 * low:.1f} to {100 * high:.1f}',
                 *(scaled(getattr(m, c.name), c.scale) for c in OVERVIEW[1:]),
-                float(np.median(ms)) if len(ms) else None,
-                float(np.percentile(ms, 95)) if len(ms) else None,
             )
         )
     headings = [c.heading for c in OVERVIEW]
     return Table(
         'overview',
         f'All measures, mean over {number(measured)}',
-        ('tracker', headings[0], '95 % interval', *headings[1:], 'median ms', 'p95 ms'),
+        ('tracker', headings[0], '95 % interval', *headings[1:]),
         tuple(rows),
-        note='The interval is of the mean over sequences (bootstrap). Times are of one update on '
-        'one core, taken while other processes may have run.',
+        note='The interval is of the mean over sequences (bootstrap).',
     )
 
 

@@ -266,8 +266,9 @@ def _tell_kept(path: Path, place: Path) -> None:
     _LOG.warning('%s is left as it was; what was written of the new one is %s', path, place)
 
 
-def write_atomically(path: Path, data: str | bytes) -> None:
-    """Write a file that is in memory under another name, then move it into place.
+@contextlib.contextmanager
+def moved_into_place(path: Path) -> Iterator[Path]:
+    """Another name for a file to be written, which gets its own when it is whole.
 
     Unlike :class:`OutputFile` it is whole whenever it is there. Its folder is made.
 
@@ -277,15 +278,25 @@ def write_atomically(path: Path, data: str | bytes) -> None:
     temporary = path.with_name(f'.{path.name}.{os.getpid()}')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if isinstance(data, str):  # names of files need not be UTF-8
-            data = data.encode('utf-8', 'backslashreplace')
-        temporary.write_bytes(data)
+        yield temporary
         temporary.replace(path)
     except OSError as error:
         raise RecordingError(cannot_write(path, error)) from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Write a file that is in memory with :func:`moved_into_place`.
+
+    Raises:
+        RecordingError: where it cannot be written.
+    """
+    if isinstance(data, str):  # names of files need not be UTF-8
+        data = data.encode('utf-8', 'backslashreplace')
+    with moved_into_place(path) as temporary:
+        temporary.write_bytes(data)
 
 
 def cannot_write(path: object, error: OSError) -> str:

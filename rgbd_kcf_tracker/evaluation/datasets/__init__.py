@@ -8,6 +8,7 @@ One module per format; :func:`open_dataset` finds out which it is.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -97,9 +98,9 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
             chosen.everyone,
         )
     else:
-        path = Path(text)
+        path = Path(os.path.abspath(text))  # workers elsewhere stand in other folders
         try:
-            require_source(path)
+            require_source(text)
         except RecordingError as error:
             raise DatasetError(f'{error} (folders, bags, or simulated scenes as sim:all)') from None
         found = _walk(path, chosen, _DEPTH)

@@ -108,7 +108,9 @@ class Sequence:
         scenario: the group it belongs to in tables.
         kind: format it lies in: folder, otb, vot, princeton, sim or recording; or everyone.
         open: opens it; made with :func:`functools.partial` so that it can be pickled.
-        identity: changes whenever other frames or another truth would come out.
+        identity: changes whenever other frames or another truth would come out of the same files.
+        content: files and folders that it is read from.
+        digest: of what is in them, where it is known already.
         categories: Princeton's splits, as far as known.
         origin: pixel coordinate of the first column and row in the data set's files, 0 or 1.
         path: where it lies; None for simulated scenes.
@@ -119,6 +121,8 @@ class Sequence:
     kind: str
     open: Callable[[], Opened] = field(compare=False)
     identity: str
+    content: tuple[Path, ...] = ()
+    digest: str = ''
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
     path: Path | None = None
@@ -186,18 +190,6 @@ def from_first_view(samples: Iterable[Sample]) -> Iterator[Sample]:
 def is_clear(box: Box | None, fraction: float | None) -> bool:
     """Whether the target shows, and at least :data:`CLEAR_FRACTION` of it where that is known."""
     return box is not None and (fraction is None or fraction >= CLEAR_FRACTION)
-
-
-def file_token(*paths: Path) -> str:
-    """Size and time of files, for :attr:`Sequence.identity`; a missing file is part of it."""
-    parts = []
-    for path in paths:
-        try:
-            stat = path.stat()
-            parts.append(f'{path.resolve()}:{stat.st_size}:{stat.st_mtime_ns}')
-        except OSError:
-            parts.append(f'{path}:-')
-    return '|'.join(parts)
 
 
 def entries(path: Path) -> list[Path]:

@@ -24,7 +24,6 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Person,
     Sample,
     Sequence,
-    file_token,
     group,
 )
 from rgbd_kcf_tracker.evaluation.datasets.folder import (
@@ -62,7 +61,8 @@ def find(path: Path, fps: float) -> list[Sequence]:
             scenario=group(path),
             kind=EVERYONE,
             open=partial(load, path, fps),
-            identity=f'everyone:{file_token(*files, *parts, path / _INFO)}:{fps}',
+            identity=f'everyone:{fps}',
+            content=(*files, *parts, path / _INFO),
             path=path,
         )
     ]

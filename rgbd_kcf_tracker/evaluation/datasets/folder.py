@@ -22,7 +22,6 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sample,
     Sequence,
     broken,
-    file_token,
     group,
     is_clear,
 )
@@ -84,7 +83,8 @@ def find(path: Path, fps: float) -> list[Sequence]:
                 scenario=path.name if person else group(path),
                 kind='folder',
                 open=partial(load, path, truth, visible, bool(person), fps),
-                identity=f'folder:{file_token(*files)}:{fps}',
+                identity=f'folder:{fps}',
+                content=files,
                 path=path,
             )
         )
@@ -111,7 +111,8 @@ def _find_ids(path: Path, fps: float) -> list[Sequence]:
             scenario=path.name,
             kind='folder',
             open=partial(load_id, path, int(who), fps),
-            identity=f'folder:{file_token(*files)}:{who}:{fps}',
+            identity=f'folder:{who}:{fps}',
+            content=files,
             path=path,
         )
         for who in np.unique(rows.ids[clear])

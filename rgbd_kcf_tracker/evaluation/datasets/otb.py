@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
     check_lengths,
@@ -58,7 +58,8 @@ def find(path: Path, fps: float) -> list[Sequence]:
                 scenario=path.parent.name or 'otb',
                 kind='otb',
                 open=partial(load, path, file, fps),
-                identity=f'otb:{file_token(file, *(path / n for n in IMAGE_FOLDERS))}:{fps}',
+                identity=f'otb:{path.name}:{fps}',
+                content=(file, *(path / n for n in IMAGE_FOLDERS)),
                 origin=ORIGIN,
                 path=path,
             )

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import ImageFrames, check_lengths
 from rgbd_kcf_tracker.evaluation.metrics.princeton import CATEGORIES
 from rgbd_kcf_tracker.geometry import Intrinsics
@@ -46,7 +46,8 @@ def find(path: Path, categories: Mapping[str, Mapping[str, str]]) -> Sequence:
         scenario=path.parent.name or 'princeton',
         kind='princeton',
         open=partial(load, path),
-        identity=f'princeton:{file_token(truth, _mat(path), *(path / n for n in _PARTS))}',
+        identity='princeton',
+        content=(truth, _mat(path), *(path / n for n in _PARTS)),
         categories=categories.get(path.name, {}),
         path=path,
     )

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, file_token, group
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, group
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 
@@ -29,7 +29,8 @@ def find(path: Path, options: ReadOptions) -> Sequence:
         scenario=group(path),
         kind='recording',
         open=partial(load, path, options),
-        identity=f'recording:{file_token(path)}:{options}',
+        identity=f'recording:{options}',
+        content=(path,),
         path=path,
     )
 

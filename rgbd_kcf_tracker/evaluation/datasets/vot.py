@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence, file_token
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import (
     ImageFrames,
     check_lengths,
@@ -27,8 +27,6 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 )
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
-
-_PARTS = ('sequence', 'color', 'depth')
 
 
 def is_sequence(path: Path) -> bool:
@@ -49,13 +47,13 @@ def listed(path: Path) -> list[Path]:
 
 def find(path: Path, fps: float) -> Sequence:
     """One sequence folder."""
-    truth = path / 'groundtruth.txt'
     return Sequence(
         name=path.name,
         scenario=path.parent.name or 'vot',
         kind='vot',
         open=partial(load, path, fps),
-        identity=f'vot:{file_token(truth, *(path / n for n in _PARTS))}:{fps}',
+        identity=f'vot:{fps}',
+        content=(path,),
         path=path,
     )
 

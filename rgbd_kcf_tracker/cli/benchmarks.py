@@ -1,0 +1,242 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the commands share that run trackers on benchmarks."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rgbd_kcf_tracker.cli.common import parse_intrinsics
+from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
+from rgbd_kcf_tracker.cli.workers import NOTICE, Progress, open_workers, record
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+
+EXIT_FAILURES = 1
+"""Exit code where the report was written but some runs failed."""
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.evaluation.contenders import Contender
+    from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
+    from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
+    from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
+
+
+def add_data_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say what data is and how it is read."""
+    group = parser.add_argument_group('data')
+    group.add_argument(
+        '--kind', default='auto', metavar='KIND',
+        help='format, where it cannot be told by the names: folder, otb, vot, cdtb, depthtrack, '
+        'princeton, recording',
+    )  # fmt: skip
+    group.add_argument(
+        '--sequences', metavar='A,B', help='only sequences whose name holds one of these'
+    )
+    group.add_argument(
+        '--fps', type=float, default=30.0, metavar='F',
+        help='rate of folders that do not state theirs (default 30)',
+    )  # fmt: skip
+    group.add_argument(
+        '--rate', type=float, metavar='HZ',
+        help='render scenes at this rate, and thin recordings out to it (5, 15, 30)',
+    )  # fmt: skip
+    group.add_argument('--no-depth', action='store_true', help='give the trackers colour alone')
+    group.add_argument(
+        '--intrinsics', metavar='FX,FY,CX,CY',
+        help="camera of recordings in pixels, instead of their own",
+    )  # fmt: skip
+    group.add_argument(
+        '--seeds', default='1', metavar='N', help='seeds of simulated scenes: 3, 1-5 (default 1)'
+    )
+    group.add_argument('--scenarios', metavar='A,B', help='only these simulated scenarios')
+    group.add_argument(
+        '--duration',
+        type=float,
+        metavar='S',
+        help='of simulated scenes (default: their own)',
+    )
+    group.add_argument(
+        '--size', default='960x540', metavar='WxH', help='of simulated images (default 960x540)'
+    )
+
+
+def data_options(args: argparse.Namespace, everyone: bool = False) -> DatasetOptions:
+    """The options of :func:`add_data_options` as data sets take them.
+
+    Raises:
+        ParameterError: for a value that cannot be.
+    """
+    from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
+
+    if args.rate is not None and not 0.1 <= args.rate <= 1000:
+        raise ParameterError(f'--rate is {args.rate:g} Hz: give 0.1 to 1000')
+    return DatasetOptions(
+        kind=args.kind,
+        fps=args.fps,
+        seeds=tuple(parse_seeds(args.seeds)),
+        scenarios=tuple(words(args.scenarios or '')),
+        rate_hz=args.rate,
+        duration_s=args.duration,
+        size=_size(args.size),
+        names=tuple(words(args.sequences or '')),
+        everyone=everyone,
+    )
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, by, height = text.lower().partition('x')
+    if not by or not width.isdigit() or not height.isdigit():
+        raise ParameterError(f'--size {text!r}: give WIDTHxHEIGHT, such as 960x540')
+    return int(width), int(height)
+
+
+def run_options(
+    args: argparse.Namespace, short_term: bool = False, fresh: bool = False
+) -> RunOptions:
+    """How runs are made, by the options of :func:`add_data_options` and what a command has more."""
+    from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+
+    return RunOptions(
+        rate_hz=args.rate,
+        use_depth=not args.no_depth,
+        short_term=short_term,
+        fresh=fresh,
+        intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+    )
+
+
+def distinct(sequences: list[Benchmark]) -> list[Benchmark]:
+    """Refuse two sequences of one name: their results would lie in one file."""
+    from rgbd_kcf_tracker.evaluation.store import slug
+
+    seen: dict[str, Benchmark] = {}
+    for sequence in sequences:
+        other = seen.setdefault(slug(sequence.name), sequence)
+        if other is not sequence:
+            raise ParameterError(
+                f'two sequences are named {sequence.name} ({other.path} and {sequence.path}): '
+                'measure them in two runs, or rename one'
+            )
+    return sequences
+
+
+def run_jobs(
+    args: argparse.Namespace,
+    sequences: list[Benchmark],
+    contenders: list[Contender],
+    options: RunOptions,
+) -> tuple[list[Benchmark], list[Contender], list[Failure]]:
+    """Run all on the workers that were asked for.
+
+    Returns:
+        Sequences and contenders with their digests, and what failed.
+    """
+    from rgbd_kcf_tracker.evaluation.runner import identify
+    from rgbd_kcf_tracker.evaluation.runner import run as run_all
+
+    with open_workers(args, _needs(sequences, contenders)) as workers:
+        # On a cluster, files are read where they are run: many machines read faster.
+        readers = None if args.cluster is None else workers
+        sequences, contenders = identify(sequences, contenders, readers)
+        total = len(sequences) * len(contenders)
+        with Progress(total, 'run') as progress, interrupts.held(NOTICE):
+            failures = run_all(
+                sequences, contenders, args.report, options, progress.report, workers,
+                lambda: interrupts.asked,
+            )  # fmt: skip
+        record(args.report, workers.describe(), failures=len(failures))
+    return sequences, contenders, failures
+
+
+def _needs(sequences: Sequence[Benchmark], contenders: Sequence[Contender]) -> list[Path]:
+    """Folders that whoever runs the sequences must have."""
+    places = [s.path.parent for s in sequences if s.path is not None]
+    boxes = [Path(c.target.partition('{sequence}')[0]) for c in contenders if c.kind == 'boxes']
+    return list(dict.fromkeys([*places, *(p if p.is_dir() else p.parent for p in boxes)]))
+
+
+def in_words(args: argparse.Namespace) -> str:
+    """What is other than usual, for the head of a report."""
+    parts = []
+    if args.rate is not None:
+        parts.append(f'{args.rate:g} Hz')
+    if args.no_depth:
+        parts.append('without depth')
+    if args.intrinsics is not None:
+        parts.append(f'camera {args.intrinsics}')
+    if any(text.startswith('sim:') for text in args.dataset):
+        parts.append(f'seeds {args.seeds} where none are given, {args.size}')
+    parts.extend(args.param)
+    return ', '.join(parts) or 'none'
+
+
+def list_failures(failures: Sequence[Failure]) -> None:
+    """Name what failed, on standard error."""
+    if not failures:
+        return
+    print(f'\n{len(failures)} failed:', file=sys.stderr)
+    for failure in failures:
+        last = failure.reason.strip().splitlines()[-1]
+        tracker = f' ({failure.tracker})' if failure.tracker else ''
+        print(f'  {failure.sequence}{tracker}: {last}', file=sys.stderr)
+
+
+def end(failures: Sequence[Failure]) -> int:
+    """List what failed; returns the exit code."""
+    list_failures(failures)
+    if interrupts.asked:
+        print('stopped; the same command goes on from here', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    return EXIT_FAILURES if failures else 0
+
+
+def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None:
+    """Refuse a folder that lies in the data, or holds other things than a report.
+
+    Raises:
+        RecordingError: where it does.
+    """
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
+    from rgbd_kcf_tracker.evaluation.report import REPORT_NAMES
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+
+    sources = [text for text in datasets if not text.startswith(PREFIX)]
+    check_outputs({'--report': folder}, sources, overwrite=True, folders=('--report',))
+    try:
+        held = set(os.listdir(folder)) if folder.exists() else set()
+    except OSError as error:
+        raise RecordingError(f'{folder} cannot be read: {error.strerror or error}') from None
+    if 'results' not in held and held - REPORT_NAMES and not overwrite:
+        raise RecordingError(
+            f'{folder} is there already, and is no report: give another name, or add '
+            '--overwrite to write into it'
+        )
+
+
+def make_report_folder(folder: Path) -> None:
+    """Make a folder for a report.
+
+    Raises:
+        RecordingError: where it cannot be written.
+    """
+    from rgbd_kcf_tracker.recordings.outputs import cannot_write, make_folder
+
+    make_folder(folder)
+    try:
+        probe = folder / '.write'
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordingError(cannot_write(folder, error)) from None
+
+
+def words(text: str) -> list[str]:
+    """The words between commas."""
+    return [word.strip() for word in text.split(',') if word.strip()]

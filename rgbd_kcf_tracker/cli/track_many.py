@@ -1,0 +1,355 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""``rgbd-kcf track`` over many recordings: a file each, and a table of all."""
+
+from __future__ import annotations
+
+import argparse
+import glob
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
+from rgbd_kcf_tracker.cli.workers import (
+    NOTICE,
+    WORKER_OPTIONS,
+    Progress,
+    add_worker_options,
+    open_workers,
+    record,
+    shard_of,
+)
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.extras import require
+
+EXIT_FAILURES = 1
+"""Exit code where some recordings failed."""
+
+EPILOG = """\
+several recordings:
+  SOURCE may be given again and may be a glob, also '**'; --list reads more. --output then names a
+  folder, and --mot, --video and --bag folders too: each recording has its file NAME.csv, NAME.txt,
+  NAME.mp4, NAME.mcap there. --output gets a table of all rows (tracks.csv or tracks.parquet) and
+  sources.csv, a row per recording, with those that failed. Run again to go on after an
+  interruption.
+
+examples:
+  rgbd-kcf track walk.mcap --output walk.csv --video walk.mp4
+  rgbd-kcf track 'day/**/*.mcap' --all --output tracks/ --table parquet --jobs 8
+  rgbd-kcf track --list bags.txt --output tracks/ --cluster tcp://HOST:8786
+"""
+
+KINDS = {'output': '.csv', 'mot': '.txt', 'video': '.mp4', 'bag': '.mcap'}
+"""Options that name a file, or here a folder, and how the files in it end."""
+
+TABLES = ('csv', 'parquet')
+SOURCES = 'sources.csv'
+_DONE = '.done'
+_STATES = ('tracking', 'occluded', 'lost')
+_OPTIONS = (
+    'init', 'all', 'variant', 'param', 'start', 'end', 'color_topic', 'depth_topic', 'info_topic',
+    'tolerance', 'fps', 'intrinsics', 'max_pixels', 'extrinsics',
+)  # fmt: skip
+"""Options that decide what comes out of a recording, as far as this command has them."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackJob:
+    """One recording.
+
+    Attributes:
+        source: its path.
+        name: of its files.
+        options: of the command, with this recording's source and files.
+        key: changes whenever something else would come out.
+    """
+
+    source: str
+    name: str
+    options: dict[str, Any]
+    key: str = ''
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of many recordings."""
+    group = parser.add_argument_group('several recordings')
+    group.add_argument(
+        '--list', metavar='FILE', help='more sources, one per line; - for standard input'
+    )
+    group.add_argument(
+        '--table', choices=TABLES, help='form of the table of all recordings (default csv)'
+    )
+    add_worker_options(group)
+
+
+def is_asked(args: argparse.Namespace) -> bool:
+    """Whether a command is about many recordings, be it that there is only one of them."""
+    named = (args.list, args.table, *(getattr(args, name) for name in WORKER_OPTIONS))
+    return (
+        len(args.source) != 1
+        or any(value is not None for value in named)
+        or _is_glob(args.source[0])
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Follow targets through all recordings that are not done yet; returns the exit code."""
+    require('batch', 'track of several recordings')
+    from rgbd_kcf_tracker.batch.loop import run_all
+    from rgbd_kcf_tracker.recordings.outputs import make_folder
+
+    sources = _sources(args)
+    folders = _folders(args)
+    jobs = [
+        _job(args, source, name, folders)
+        for source, name in zip(sources, _names(sources), strict=True)
+    ]
+    shard = shard_of(args)
+    own = jobs if shard is None else shard.of(jobs)
+    if args.table == 'parquet':
+        require('parquet', '--table parquet')
+    _check_parameters(args)
+    for folder in folders.values():
+        make_folder(folder)
+    needs = list(dict.fromkeys(Path(job.source).parent for job in own))
+    with open_workers(args, needs, list(folders.values())) as workers:
+        own = _identified(own, None if args.cluster is None else workers)
+        todo = [job for job in own if not _is_done(folders['output'], job)]
+        _refuse_to_replace(todo, args)
+        rows: dict[str, dict[str, Any]] = {}
+        with Progress(len(own), 'recording') as progress, interrupts.held(NOTICE):
+            progress.report(len(own) - len(todo), '', found=True)
+            for done in run_all(_follow, todo, workers, stopped=lambda: interrupts.asked):
+                name = done.item.name
+                if done.result is None:
+                    rows[name] = {'error': _reason(done.error)}
+                else:
+                    _keep(folders['output'], done.item, done.result)
+                progress.report(1, name)
+        record(folders['output'], workers.describe(), failures=len(rows))
+    if interrupts.asked:
+        print('stopped; the same command goes on from here', file=sys.stderr)
+        return EXIT_INTERRUPTED
+    if shard is not None:
+        print(
+            f'part {shard}: {len(own)} of {len(jobs)} recordings; once all parts are there, run '
+            'once more without --shard for the tables'
+        )
+    else:
+        _write_tables(folders['output'], own, rows, args.table or TABLES[0])
+    for name, row in rows.items():
+        print(f'{name}: {row["error"]}', file=sys.stderr)
+    print(f'{len(own) - len(rows)} of {len(own)} recordings are in {folders["output"]}')
+    return EXIT_FAILURES if rows else 0
+
+
+# --- what is asked for
+
+
+def _is_glob(text: str) -> bool:
+    return glob.has_magic(text) and not os.path.exists(text)
+
+
+def _sources(args: argparse.Namespace) -> list[str]:
+    """Paths of all recordings, each once.
+
+    Raises:
+        RecordingError: for a path that is not there, a pattern without a match, or a list that
+            cannot be read.
+    """
+    from rgbd_kcf_tracker.recordings.textfiles import natural_key
+
+    found: list[str] = []
+    for text in [*args.source, *(_listed(args.list) if args.list else [])]:
+        if _is_glob(text):
+            matches = sorted(glob.glob(text, recursive=True), key=natural_key)
+            if not matches:
+                raise RecordingError(f'{text} matches nothing')
+            found += matches
+        elif os.path.exists(text):
+            found.append(text)
+        else:
+            raise RecordingError(f'{text} does not exist')
+    if not found:
+        raise RecordingError('no recordings: give SOURCE, or --list FILE with one per line')
+    # Workers elsewhere stand in other folders.
+    return list(dict.fromkeys(os.path.abspath(path) for path in found))
+
+
+def _listed(place: str) -> list[str]:
+    try:
+        text = sys.stdin.read() if place == '-' else Path(place).read_text(encoding='utf-8')
+    except OSError as error:
+        raise RecordingError(f'{place} cannot be read: {error.strerror or error}') from None
+    except UnicodeDecodeError:
+        raise RecordingError(f'{place} is not a text file') from None
+    lines = (line.strip() for line in text.splitlines())
+    return [line for line in lines if line and not line.startswith('#')]
+
+
+def _names(sources: Sequence[str]) -> list[str]:
+    """A short name for each: the last part of its path, and as many more as tell it apart."""
+    from rgbd_kcf_tracker.evaluation.store import slug
+
+    parts = [Path(source).with_suffix('').parts[1:] or ('recording',) for source in sources]
+    names = ['' for _ in parts]
+    for length in range(1, max(map(len, parts)) + 1):
+        taken = [slug('_'.join(own[-length:])) for own in parts]
+        for i, name in enumerate(taken):
+            if not names[i] and taken.count(name) == 1 and name not in names:
+                names[i] = name
+    for i, name in enumerate(names):  # walk.mcap beside walk/, say
+        if not name:
+            names[i] = slug('_'.join(Path(sources[i]).parts[1:]))
+    if len(set(names)) < len(names):
+        twice = next(s for s, n in zip(sources, names, strict=True) if names.count(n) > 1)
+        raise ParameterError(f'{twice}: another source would have the same file: rename one')
+    return names
+
+
+def _folders(args: argparse.Namespace) -> dict[str, Path]:
+    if args.output is None or args.output == '-':
+        raise ParameterError('several recordings: give the folder for their files as --output DIR')
+    given = {kind: getattr(args, kind) for kind in KINDS}
+    return {kind: Path(os.path.abspath(path)) for kind, path in given.items() if path}
+
+
+def _job(args: argparse.Namespace, source: str, name: str, folders: dict[str, Path]) -> TrackJob:
+    options = {key: value for key, value in vars(args).items() if key != 'run'}
+    options |= dict.fromkeys(KINDS)
+    for kind, folder in folders.items():
+        inner = 'tracks' if kind == 'output' else ''
+        options[kind] = str(folder / inner / f'{name}{KINDS[kind]}')
+    return TrackJob(source, name, options | {'source': source})
+
+
+def _check_parameters(args: argparse.Namespace) -> None:
+    """Mistakes that every recording would stumble on are told once, before any of them."""
+    from rgbd_kcf_tracker.cli import track
+    from rgbd_kcf_tracker.cli.common import parse_box, read_options
+
+    track.make_follower(args)
+    for text in args.init:
+        parse_box(text)
+    read_options(args)
+
+
+# --- one recording
+
+
+def _identified(jobs: list[TrackJob], workers: Any) -> list[TrackJob]:
+    """The jobs with their keys: content of the recording, options, code and libraries."""
+    from rgbd_kcf_tracker.batch.content import files_digest
+    from rgbd_kcf_tracker.batch.digests import digests
+    from rgbd_kcf_tracker.batch.environment import environment
+    from rgbd_kcf_tracker.cli import track
+
+    content = digests({job.name: (Path(job.source),) for job in jobs}, workers)
+    code = [environment().digest, files_digest([Path(track.__file__)])]
+    found = []
+    for job in jobs:
+        options = {name: job.options[name] for name in _OPTIONS if name in job.options}
+        kinds = [kind for kind in KINDS if job.options[kind]]
+        text = json.dumps([content[job.name], code, options, kinds], sort_keys=True)
+        found.append(replace(job, key=hashlib.sha256(text.encode()).hexdigest()[:24]))
+    return found
+
+
+def _files(job: TrackJob) -> list[Path]:
+    return [Path(job.options[kind]) for kind in KINDS if job.options[kind]]
+
+
+def _done_path(folder: Path, job: TrackJob) -> Path:
+    return folder / _DONE / f'{job.name}.json'
+
+
+def _is_done(folder: Path, job: TrackJob) -> bool:
+    kept = _kept(folder, job)
+    return kept.get('key') == job.key and all(path.is_file() for path in _files(job))
+
+
+def _kept(folder: Path, job: TrackJob) -> dict[str, Any]:
+    """What is known of a recording that was done, nothing where it was not."""
+    try:
+        kept = json.loads(_done_path(folder, job).read_text(encoding='utf-8'))
+        return kept if isinstance(kept, dict) else {}
+    except (OSError, ValueError):
+        return {}
+
+
+def _refuse_to_replace(jobs: Sequence[TrackJob], args: argparse.Namespace) -> None:
+    there = [path for job in jobs for path in _files(job) if path.exists()]
+    if there and not getattr(args, 'overwrite', False):
+        more = f' and {len(there) - 1} more' if len(there) > 1 else ''
+        raise RecordingError(
+            f'{there[0]}{more} would be replaced, made with other options, another version or from '
+            'another recording: give another folder, or add --overwrite'
+        )
+
+
+def _follow(job: TrackJob) -> dict[str, Any]:
+    """Follow through one recording; its files get their names when they are whole."""
+    from rgbd_kcf_tracker.cli import track
+
+    wanted = {kind: Path(job.options[kind]) for kind in KINDS if job.options[kind]}
+    parts = {kind: path.with_name(f'.part-{path.name}') for kind, path in wanted.items()}
+    for path in parts.values():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)  # of a worker that died
+    options = job.options | {kind: str(path) for kind, path in parts.items()}
+    try:
+        outcome = track.follow(argparse.Namespace(**options), watched=False)
+        for kind, path in wanted.items():
+            parts[kind].replace(path)
+    finally:
+        for path in parts.values():
+            path.unlink(missing_ok=True)
+    m = outcome.measures
+    return {
+        'frames': outcome.frames,
+        'targets': outcome.targets,
+        **{state: outcome.states.get(state, 0) for state in _STATES},
+        'success': None if m is None else round(m.success, 6),
+        'iou': None if m is None else round(m.iou, 6),
+        'strangers': None if m is None else round(m.strangers, 6),
+        'warnings': len(outcome.warnings),
+    }
+
+
+def _keep(folder: Path, job: TrackJob, result: dict[str, Any]) -> None:
+    from rgbd_kcf_tracker.recordings.outputs import write_atomically
+
+    write_atomically(_done_path(folder, job), json.dumps({'key': job.key, **result}) + '\n')
+
+
+def _reason(error: Exception | None) -> str:
+    if isinstance(error, RgbdKcfError):
+        return str(error)
+    return f'{type(error).__name__}: {error}'
+
+
+# --- all recordings
+
+
+def _write_tables(
+    folder: Path, jobs: Sequence[TrackJob], failed: dict[str, dict[str, Any]], form: str
+) -> None:
+    from rgbd_kcf_tracker.recordings.tables import join_csv, write_rows
+
+    header = ('name', 'source', 'frames', 'targets', *_STATES, 'success', 'iou', 'strangers',
+              'warnings', 'error')  # fmt: skip
+    rows = []
+    for job in jobs:
+        known = failed.get(job.name) or _kept(folder, job)
+        row = {'name': job.name, 'source': job.source, **known}
+        rows.append(['' if row.get(k) is None else row[k] for k in header])
+    write_rows(folder / SOURCES, header, rows)
+    tracks = {job.name: Path(job.options['output']) for job in jobs if job.name not in failed}
+    join_csv(tracks, folder / f'tracks.{form}')
