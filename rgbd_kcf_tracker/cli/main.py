@@ -69,6 +69,13 @@ def _run(arguments: list[str]) -> int:
     except RgbdKcfError as error:
         print(f'{PROGRAM}: error: {error}', file=sys.stderr)
         return EXIT_USAGE
+    except ModuleNotFoundError as error:
+        from rgbd_kcf_tracker.recordings import BAG_LIBRARIES, HOW_TO_GET_THEM
+
+        if error.name not in BAG_LIBRARIES:
+            raise
+        print(f'{PROGRAM}: error: {error.name} is missing: {HOW_TO_GET_THEM}', file=sys.stderr)
+        return EXIT_USAGE
     except BrokenPipeError:
         # The reader of our output is gone (``| head``): nothing is left to say.
         import contextlib

@@ -109,14 +109,7 @@ def __getattr__(name: str) -> Any:
 
     if name not in _HOMES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    try:
-        value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
-    except ModuleNotFoundError as error:
-        if error.name not in BAG_LIBRARIES:
-            raise
-        from rgbd_kcf_tracker.errors import RecordingError
-
-        raise RecordingError(f'{error.name} is missing: {HOW_TO_GET_THEM}') from None
+    value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
     globals()[name] = value
     return value
 
