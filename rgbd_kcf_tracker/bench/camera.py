@@ -89,7 +89,7 @@ class Camera:
             )
             for where in (NAMESPACE, *([WIRE] if wire else []))
         ]
-        self._answers = 0
+        self._answers = self._stamp_ns = 0
         self._known = False
         self.node.create_subscription(
             PolygonStamped, 'tracker/box', self._answered, QoSProfile(depth=100)
@@ -155,7 +155,9 @@ class Camera:
         from rgbd_kcf_tracker.ros.messages import stamp_from_ns
 
         color, depth, info = messages
-        stamp = stamp_from_ns(time.time_ns())
+        # A clock that is set back would make an image late, which is not answered.
+        self._stamp_ns = max(time.time_ns(), self._stamp_ns + 1)
+        stamp = stamp_from_ns(self._stamp_ns)
         color.header.stamp = depth.header.stamp = info.header.stamp = stamp
         for publisher, message in zip(self._publishers[to], (info, color, depth), strict=True):
             publisher.publish(message)
