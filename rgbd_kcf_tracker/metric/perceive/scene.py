@@ -29,6 +29,10 @@ class Scene:
     Attributes:
         view: the depth.
         floor: the floor, or None where none was found.
+        elevation: ``(h, w)`` float32 metres above the floor, or None likewise.
+        forward: ``(h, w)`` float32 metres along the floor, or along the optical axis where no floor
+            is known.
+        standing: ``(h, w)`` bool, pixels with a reading that are not floor.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         codes: ``(h, w)`` int32 colour codes.
@@ -37,6 +41,9 @@ class Scene:
 
     view: DepthView
     floor: Floor | None
+    elevation: npt.NDArray[np.float32] | None
+    forward: npt.NDArray[np.float32]
+    standing: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     codes: npt.NDArray[np.int32]
@@ -84,13 +91,16 @@ class SceneReader:
             self._rim, self._shape = None, view.shape
         floor = self._floors.update(view) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
+        forward = view.depth
+        if floor is not None and elevation is not None:
+            forward = floor.forward(view.depth, elevation)
         mask = standing(view, elevation, self._floor_margin)
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
         lab = view_lab(frame.color, view.step, view.shape)
         codes = color_codes(lab, self._light(lab))
-        return Scene(view, floor, surfaces, self._rim, codes, lab)
+        return Scene(view, floor, elevation, forward, mask, surfaces, self._rim, codes, lab)
 
     def _light(self, lab: npt.NDArray[np.uint8]) -> float:
         """How much brighter the scene is than at first, by sudden changes of all of it."""
