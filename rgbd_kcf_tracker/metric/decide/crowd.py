@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
-from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.upright import upright
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -57,37 +58,35 @@ class Account:
     odds: FloatArray
     owner: list[int] = field(default_factory=list)
 
+    def somebody(self, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
+        """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
+        mask = np.zeros(shape, np.bool_)
+        for sight, owner in zip(self.sights, self.owner, strict=True):
+            if owner >= 0 and self.people[owner].alive:
+                seen = sight.figure.seen
+                mask[seen.rows, seen.cols] |= seen.mask
+        return mask
+
 
 class Crowd:
     """Gives everyone who stands before the room an identity and keeps it.
 
     Attributes:
         people: all who are known.
-        room: the room behind them.
     """
 
     def __init__(self) -> None:
         self.people: list[Person] = []
-        self.room = Room()
         self._next = 1
-        self._time = 0.0
-        self._started = False
 
     def step(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds."""
-        depth = scene.view.depth
-        if not self._started or self.room.depth.shape != depth.shape:
-            self.room.restart(depth, np.zeros(depth.shape, np.bool_))
-            self._started = True
-        else:
-            self.room.update(depth, time - self._time, None)
-        self._time = time
         expected = np.array([p.expected(time) for p in self.people if time - p.seen_at < RECENT])
-        figures = find_figures(scene, self.room.before, expected.reshape(-1, 2))
+        figures = find_figures(scene, expected.reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
         account = Account(sights, list(self.people), self._odds(sights, time))
         self._assign(account)
-        self._learn(account, time)
+        self._learn(account, scene.view.intrinsics, time)
         return account
 
     def _odds(self, sights: list[Sight], time: float) -> FloatArray:
@@ -110,7 +109,7 @@ class Crowd:
             if account.odds[row, column] > NEW:
                 account.owner[column] = int(row)
 
-    def _learn(self, account: Account, time: float) -> None:
+    def _learn(self, account: Account, k: Intrinsics, time: float) -> None:
         places = [s.figure.place for s in account.sights]
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
@@ -132,6 +131,7 @@ class Crowd:
             if not sure:
                 continue
             figure = sight.figure
+            person.upright |= upright(figure.seen, k, figure.top)
             if sight.view.top is not None and sight.view.top > 1.2:
                 person.gallery.learn_height(sight.view.top)
             alone = all(

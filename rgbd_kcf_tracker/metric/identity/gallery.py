@@ -43,10 +43,11 @@ LEAST_SLICE = 0.004
 LEAST_PIXELS = 30
 """Pixels left of a silhouette without its rim, where colours are mixed with the background's."""
 
-STEEPNESS, EVEN = 22.0, 0.74
-"""Of the logistic curve from similarity to the log-odds of being the same person, and where it is
-even; fitted on real people (docs/metric.md)."""
-SUREST_SAME, SUREST_OTHER = 3.5, -4.5
+STEEPNESS, EVEN, EVEN_PER_VIEW = 11.0, 0.62, 0.05
+"""Of the logistic curve from similarity to the log-odds of being the same person, where it is even
+for one view, and by how much more with each doubling of their number (the best of many is more
+alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
+SUREST_SAME, SUREST_OTHER = 3.5, -4.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
 WHOLE_AREA = 0.3
 """Square metres of a view in which all of somebody shows; less of it tells less."""
@@ -187,14 +188,15 @@ def similarity(view: View, looks: Looks) -> FloatArray:
     return np.maximum(best, 0)
 
 
-def look_log_odds(alike: float, area: float) -> float:
+def look_log_odds(alike: float, area: float, views: int = 1) -> float:
     """Log-odds that a view is of the person, from its likeness to the most alike view of his.
 
     Args:
         alike: see :func:`similarity`.
         area: square metres of the view that show.
+        views: how many views of his it was compared with.
     """
-    raw = STEEPNESS * (alike - EVEN)
+    raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * np.log2(views))
     share = 0.4 + 0.6 * min(1.0, area / WHOLE_AREA)
     return float(min(max(raw, SUREST_OTHER), SUREST_SAME)) * share
 
@@ -249,7 +251,7 @@ class Gallery:
         odds = height_log_odds(view.top, self.top)
         if self.looks is None:
             return odds
-        return odds + look_log_odds(self.alike(view), view.total)
+        return odds + look_log_odds(self.alike(view), view.total, len(self.views))
 
     def learn_height(self, top: float) -> None:
         """Take a height of the head above the floor, in metres."""

@@ -26,6 +26,8 @@ ROOM_AREA = 16.0
 """Square metres of floor that a camera sees: a stranger may be anywhere in it."""
 FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
+TRAVELLED = 0.5
+"""Metres that a thing which was moved, or the noise of one, does not travel."""
 ELSEWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden)."""
 
@@ -42,6 +44,7 @@ class Person:
     Attributes:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
+        upright: whether it ever had the shape of a person.
         travelled: metres, the farthest from where it was first seen.
     """
 
@@ -51,7 +54,13 @@ class Person:
         self.first_place, self.travelled = place.copy(), 0.0
         self.seen_at = self.first_seen = time
         self.sightings = 1
+        self.upright = False
         self.gallery = Gallery()
+
+    @property
+    def alive(self) -> bool:
+        """Whether this is surely somebody and not a thing that was moved or a door that opened."""
+        return self.chosen or self.upright or self.travelled > TRAVELLED
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""

@@ -68,15 +68,14 @@ class Figure:
     place: FloatArray
 
 
-def find_figures(scene: Scene, before: Mask, expected: FloatArray) -> list[Figure]:
+def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
     """The figures of a scene.
 
     Args:
         scene: of now.
-        before: ``(h, w)`` bool, what stands before the room.
         expected: ``(n, 2)`` metres across and deep, where people are expected.
     """
-    pieces = cut(scene.view.depth, before & scene.standing, JUMP, JUMP_PER_METRE)
+    pieces = cut(scene.view.depth, scene.before & scene.standing, JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
     for members in _joined(scene, pieces):
         boxes = pieces.boxes[members]

@@ -25,8 +25,11 @@ BLIND_FRAMES = 3
 """Frames without a reading after which a pixel is known to have none: a reading there is new."""
 BLEND = 0.1
 """Share of a new reading in the room's depth."""
-SETTLE = 20.0
+SETTLE = 3.0
 """Seconds for which something that is nobody's must have stood still to become part of the room."""
+LEAP, LEAP_PER_SECOND = 0.2, 1.5
+"""Metres by which the depth of a person goes up from one frame to the next at the most; where it
+goes up by more he has gone, and what shows is the room behind him."""
 
 
 def tolerance(depth: DepthArray) -> DepthArray:
@@ -49,6 +52,7 @@ class Room:
         self.depth: DepthArray = np.zeros((0, 0), np.float32)
         self.before: Mask = np.zeros((0, 0), np.bool_)
         self._farther: DepthArray = self.depth
+        self._front: DepthArray = self.depth
         self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
@@ -60,11 +64,13 @@ class Room:
         self._farther = np.zeros_like(depth)
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
+        self._front = np.where(somebody, depth, np.float32(0))
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
         self.depth[somebody] = 0
         self._blind[somebody] = BLIND_FRAMES
+        self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
 
     def update(self, depth: DepthArray, dt: float, somebody: Mask | None) -> None:
@@ -82,13 +88,19 @@ class Room:
         nearer = self.depth - depth
         both = valid & known
         before = both & (nearer > allowed)
-        before |= valid & ~known & (self._blind >= BLIND_FRAMES)
+        open_ = valid & ~known & (self._blind >= BLIND_FRAMES)
+        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + allowed
+        left = open_ & (self._front > 0) & (depth > self._front + leap)
+        open_ &= ~left
+        before |= open_
+        np.copyto(self._front, depth, where=open_)
         farther = both & (nearer < -allowed)
         again = farther & (np.abs(depth - self._farther) <= allowed)
         same = both & ~before & ~farther
         self.depth[same] -= np.float32(BLEND) * nearer[same]
         self.depth[again] = depth[again]
         self._farther = np.where(farther, depth, np.float32(0))
+        self._blind[left] = 0
         unknown = ~known
         fresh = unknown & valid & ~before
         self.depth[fresh] = depth[fresh]

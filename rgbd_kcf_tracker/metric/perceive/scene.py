@@ -11,16 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_lab
+from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_image, view_lab
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
+from rgbd_kcf_tracker.metric.perceive.light import Light
+from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
-
-SUDDEN = 4.0
-"""Change of median lightness (of 255) from one frame to the next that is a change of light."""
-LIGHT_STEP = 3
-
+from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
@@ -33,6 +31,7 @@ class Scene:
         forward: ``(h, w)`` float32 metres along the floor, or along the optical axis where no floor
             is known.
         standing: ``(h, w)`` bool, pixels with a reading that are not floor.
+        before: ``(h, w)`` bool, pixels that show something before the room.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         codes: ``(h, w)`` int32 colour codes.
@@ -44,6 +43,7 @@ class Scene:
     elevation: npt.NDArray[np.float32] | None
     forward: npt.NDArray[np.float32]
     standing: npt.NDArray[np.bool_]
+    before: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     codes: npt.NDArray[np.int32]
@@ -58,6 +58,12 @@ class Scene:
 
 class SceneReader:
     """Reads frames of one stream; what does not change between them is remembered.
+
+    Attributes:
+        room: what stands still.
+        somebody: ``(h, w)`` bool, pixels of the last view that belong to somebody, who may stand
+            still without becoming part of the room; to be set by who decides. None for nobody.
+        last_view: the depth of the last frame that had any.
 
     Args:
         width: columns of the view.
@@ -77,8 +83,10 @@ class SceneReader:
         self._floors = FloorFinder(seed)
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
-        self._lightness: npt.NDArray[np.int16] | None = None
-        self._brighter = 0.0
+        self._stamp_ns = 0
+        self._light = Light()
+        self.room = Room()
+        self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
 
     def read(self, frame: Frame) -> Scene | None:
@@ -98,16 +106,17 @@ class SceneReader:
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
-        lab = view_lab(frame.color, view.step, view.shape)
-        codes = color_codes(lab, self._light(lab))
-        return Scene(view, floor, elevation, forward, mask, surfaces, self._rim, codes, lab)
-
-    def _light(self, lab: npt.NDArray[np.uint8]) -> float:
-        """How much brighter the scene is than at first, by sudden changes of all of it."""
-        lightness = lab[::LIGHT_STEP, ::LIGHT_STEP, 0].astype(np.int16)
-        if self._lightness is not None and self._lightness.shape == lightness.shape:
-            change = float(np.median(lightness - self._lightness))
-            if abs(change) >= SUDDEN:
-                self._brighter = float(np.clip(self._brighter + change, -128, 128))
-        self._lightness = lightness
-        return self._brighter
+        seconds = max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
+        self._stamp_ns = frame.stamp_ns
+        if self.room.depth.shape != view.shape:
+            self.room.restart(
+                view.depth, upright_people(view, surfaces, elevation, self._rim)
+            )
+            self.somebody = None
+        else:
+            self.room.update(view.depth, seconds, self.somebody)
+        before = self.room.before
+        image = view_image(frame.color, view.step, view.shape)
+        lab = view_lab(self._light.steadied(image, ~before))
+        codes = color_codes(lab)
+        return Scene(view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab)
