@@ -38,6 +38,7 @@ class Track:
         depth: distance of the target along the optical axis in metres; None where unknown.
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
             forward, x right, y down); None where depth or intrinsics are unknown.
+        id: of the target among several; 0 where there is only one.
     """
 
     box: Box | None
@@ -45,6 +46,7 @@ class Track:
     score: float = 0.0
     depth: float | None = None
     position: tuple[float, float, float] | None = None
+    id: int = 0
 
     @property
     def occluded(self) -> bool:

@@ -28,7 +28,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import at_rate, with_intrinsics
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.decide.evidence import OTHER_COLORS, WEIGHTS
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.tracker import MetricTracker
+from rgbd_kcf_tracker.metric.targets import MetricTracker
 
 FloatArray = npt.NDArray[np.float64]
 

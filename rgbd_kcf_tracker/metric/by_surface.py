@@ -12,12 +12,14 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
-from rgbd_kcf_tracker.metric.decide.proposals import Expectation, gathered, propose
+from rgbd_kcf_tracker.metric.decide.crowd import Account
+from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -56,8 +58,9 @@ class BySurface:
     """Follows one target from scene to scene.
 
     Args:
-        scene: the first.
+        account: of the first frame.
         first: the target's silhouette in it.
+        person: the target as one of the crowd.
         parameters: of the tracker.
 
     Attributes:
@@ -65,8 +68,12 @@ class BySurface:
         hidden_for: seconds since the target was last seen.
     """
 
-    def __init__(self, scene: Scene, first: Silhouette, parameters: MetricParameters) -> None:
+    def __init__(
+        self, account: Account, first: Silhouette, person: Person, parameters: MetricParameters
+    ) -> None:
         self._parameters = parameters
+        self._person = person
+        scene = account.scene
         self.body = Body(first)
         self._bystanders = Bystanders()
         self._bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
@@ -88,8 +95,13 @@ class BySurface:
         self._learn_around(scene, None)
 
     @staticmethod
-    def surface_of(scene: Scene, box: Box) -> Silhouette | None:
-        """The surface that a box of the image is drawn about, or None where no one fits."""
+    def surface_of(account: Account, box: Box) -> Silhouette | None:
+        """The figure or surface that a box of the image is drawn about, None where none fits."""
+        scene = account.scene
+        figures = [sight.figure.seen for sight in account.sights]
+        overlaps = [BySurface.outline(scene, seen).iou(box) for seen in figures]
+        if figures and max(overlaps) >= LOCK_IOU:
+            return figures[int(np.argmax(overlaps))]
         step = scene.view.step
         rows, cols = scene.view.shape
         x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
@@ -110,13 +122,14 @@ class BySurface:
 
     # -- one frame --------------------------------------------------------------------------------
 
-    def step(self, scene: Scene, dt: float) -> Candidate | None:
-        """Look for the target in the next scene, ``dt`` seconds later.
+    def step(self, account: Account, dt: float) -> Candidate | None:
+        """Look for the target in the next frame, ``dt`` seconds later.
 
         Returns:
             What is most likely the target, or None where nothing is. What follows from it is only
             taken in by :meth:`take` or :meth:`miss`, one of which must be called.
         """
+        scene = account.scene
         following = self.hidden_for == 0.0
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
         self._bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
@@ -129,13 +142,18 @@ class BySurface:
         found = propose(
             scene, self.body, expected, self._bystanders, self._parameters.most_candidates
         )
-        self.candidates = [self._weighed(scene, seen, dt, missing) for seen in found]
+        found += [
+            sight.figure.seen
+            for sight in account.sights
+            if sight.figure.seen.area < MOST_SHARE * self.body.area
+        ]
+        self.candidates = [self._weighed(account, seen, dt, missing) for seen in found]
         self.candidates.sort(key=lambda c: -c.probability)
         for candidate in self.candidates[:2]:
             whole = gathered(scene, self.body, candidate.seen, candidate.placed, self._bystanders)
             if whole is None:
                 continue
-            more = self._weighed(scene, whole, dt, missing)
+            more = self._weighed(account, whole, dt, missing)
             if _logit(more.probability) > _logit(candidate.probability) - 1.0:
                 self.candidates.append(more)
                 if candidate is self.candidates[0]:
@@ -210,8 +228,9 @@ class BySurface:
             )
         self._cloud.step(dt, scene.view, PLACED_MIDDLE * self.body.height)
 
-    def _weighed(self, scene: Scene, seen: Silhouette, dt: float, missing: bool) -> Candidate:
-        body, motion = self.body, self.motion
+    def _weighed(self, account: Account, seen: Silhouette, dt: float, missing: bool) -> Candidate:
+        scene, body, motion = account.scene, self.body, self.motion
+        claim = account.claim(self._person, seen)
         placed = body.place(seen, scene.codes, scene.view, motion.position, motion.sigma)
         variance = np.square(motion.sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
@@ -236,6 +255,9 @@ class BySurface:
             hidden=self.hidden_for,
             missing=missing,
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
+            look=claim.look,
+            rival=claim.rival,
+            room=claim.room if self._person.walked else 0.0,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 

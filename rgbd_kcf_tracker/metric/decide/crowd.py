@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import upright
 
 FloatArray = npt.NDArray[np.float64]
@@ -30,6 +30,12 @@ WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
+NEW_SCORE = 0.5
+"""Score of somebody who has just come into view."""
+HELD = -2
+"""Owner of a sight that may be a target which was not found: nobody new is made of it."""
+MOST = 0.5
+"""Share of a silhouette's pixels from which it is taken to be the same as a figure."""
 RECENT = 0.6
 """Seconds after the last sight for which a figure is parted where somebody is expected."""
 
@@ -42,25 +48,102 @@ class Sight:
     view: View
 
 
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What the others in view say of a candidate.
+
+    Attributes:
+        look: log-odds that its look is the target's.
+        rival: log-odds that it is somebody else, at least 0: somebody new is always possible.
+        room: share of its pixels that are the room, 0 to 1.
+    """
+
+    look: float
+    rival: float
+    room: float
+
+
 @dataclass(slots=True, eq=False)
 class Account:
     """How a frame is explained.
 
     Attributes:
+        scene: what it shows.
+        time: seconds.
         sights: what stands before the room, ``n`` of them.
         people: all who are known, ``m`` of them.
         odds: ``(m, n)`` log-odds of each being each.
         owner: for each sight the index among ``people``, or -1.
     """
 
+    scene: Scene
+    time: float
     sights: list[Sight]
     people: list[Person]
     odds: FloatArray
     owner: list[int] = field(default_factory=list)
+    _which: npt.NDArray[np.int16] | None = None
 
-    def somebody(self, shape: tuple[int, int]) -> npt.NDArray[np.bool_]:
+    @property
+    def which(self) -> npt.NDArray[np.int16]:
+        """For each pixel the number of its sight from 1, or 0, ``(h, w)``."""
+        if self._which is None:
+            self._which = np.zeros(self.scene.view.shape, np.int16)
+            for number, sight in enumerate(self.sights, 1):
+                seen = sight.figure.seen
+                self._which[seen.rows, seen.cols][seen.mask] = number
+        return self._which
+
+    def place(self, seen: Silhouette) -> FloatArray:
+        """Where a silhouette is, ``(2,)`` metres across and along the floor."""
+        left, _, right, _ = seen.metres
+        ahead = float(self.scene.forward[seen.rows, seen.cols][seen.mask].mean())
+        return np.array([(left + right) / 2, ahead])
+
+    def probability(self, row: int, column: int) -> float:
+        """That a sight is of one of the people rather than of any other, 0 to 1."""
+        if row >= len(self.odds):
+            return NEW_SCORE
+        odds = self.odds[:, column]
+        others = np.delete(odds, row)
+        total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
+        return float(1 / (1 + total * np.exp(-min(odds[row], 30))))
+
+    def sight_of(self, seen: Silhouette) -> int:
+        """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
+        if not self.sights:
+            return -1
+        pixels = self.which[seen.rows, seen.cols][seen.mask]
+        counts = np.bincount(pixels, minlength=len(self.sights) + 1)
+        best = int(np.argmax(counts[1:]))
+        return best if counts[best + 1] > MOST * len(pixels) else -1
+
+    def look(self, seen: Silhouette) -> View:
+        """The look of any silhouette of the frame."""
+        for sight in self.sights:
+            if sight.figure.seen is seen:
+                return sight.view
+        top = None
+        scene = self.scene
+        if scene.elevation is not None and not seen.cut.top:
+            top = float(np.percentile(scene.elevation[seen.rows, seen.cols][seen.mask], 98))
+        return View.of(scene.view, scene.lab, seen, top)
+
+    def claim(self, person: Person, seen: Silhouette) -> Claim:
+        """What all that is known of the frame says of a silhouette being ``person``."""
+        look = person.gallery.log_odds(self.look(seen))
+        index = self.sight_of(seen)
+        rival = 0.0
+        if index >= 0:
+            for row, other in enumerate(self.people[: len(self.odds)]):
+                if other is not person:
+                    rival = max(rival, float(self.odds[row, index]))
+        before = self.scene.before[seen.rows, seen.cols][seen.mask]
+        return Claim(look, rival, 1.0 - np.count_nonzero(before) / len(before))
+
+    def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
-        mask = np.zeros(shape, np.bool_)
+        mask = np.zeros(self.scene.view.shape, np.bool_)
         for sight, owner in zip(self.sights, self.owner, strict=True):
             if owner >= 0 and self.people[owner].alive:
                 seen = sight.figure.seen
@@ -79,14 +162,40 @@ class Crowd:
         self.people: list[Person] = []
         self._next = 1
 
-    def step(self, scene: Scene, time: float) -> Account:
-        """Explain the next frame at ``time`` seconds."""
-        expected = np.array([p.expected(time) for p in self.people if time - p.seen_at < RECENT])
-        figures = find_figures(scene, expected.reshape(-1, 2))
+    def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
+        """Somebody new at ``place``, ``(2,)`` metres."""
+        person = Person(self._next, place, time, chosen)
+        self._next += 1
+        self.people.append(person)
+        return person
+
+    def chosen(self, account: Account, seen: Silhouette) -> Person:
+        """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
+        index = account.sight_of(seen)
+        if index >= 0 and account.owner[index] >= 0:
+            person = account.people[account.owner[index]]
+            if account.time == person.seen_at:
+                person.chosen = True
+                return person
+        person = self.welcome(account.place(seen), account.time, chosen=True)
+        account.people.append(person)
+        if index >= 0:
+            account.owner[index] = len(account.people) - 1
+        self._see(account, len(account.people) - 1, seen, index)
+        return person
+
+    def explain(self, scene: Scene, time: float) -> Account:
+        """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
+        expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
+        figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
-        account = Account(sights, list(self.people), self._odds(sights, time))
-        self._assign(account)
-        self._learn(account, scene.view.intrinsics, time)
+        account = Account(scene, time, sights, list(self.people), self._odds(sights, time))
+        account.owner = [-1] * len(sights)
+        if account.odds.size:
+            rows, columns = linear_sum_assignment(-np.maximum(account.odds - NEW, 0))
+            for row, column in zip(rows, columns, strict=True):
+                if account.odds[row, column] > NEW:
+                    account.owner[column] = int(row)
         return account
 
     def _odds(self, sights: list[Sight], time: float) -> FloatArray:
@@ -100,45 +209,60 @@ class Crowd:
                 odds[row, column] += person.gallery.log_odds(sight.view)
         return odds
 
-    def _assign(self, account: Account) -> None:
-        account.owner = [-1] * len(account.sights)
-        if not account.odds.size:
-            return
-        rows, columns = linear_sum_assignment(-np.maximum(account.odds - NEW, 0))
-        for row, column in zip(rows, columns, strict=True):
-            if account.odds[row, column] > NEW:
-                account.owner[column] = int(row)
+    def learn(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+        """Take what was seen.
 
-    def _learn(self, account: Account, k: Intrinsics, time: float) -> None:
-        places = [s.figure.place for s in account.sights]
+        Args:
+            account: of the frame.
+            targets: where those who are followed by other means were found, by their numbers; None
+                where they were not: nobody else's sight of them counts.
+        """
+        people, time = account.people, account.time
+        for row, person in enumerate(people):
+            if person.number not in targets:
+                continue
+            for column, owner in enumerate(account.owner):
+                if owner == row:
+                    account.owner[column] = HELD
+            seen = targets[person.number]
+            if seen is None:
+                continue
+            index = account.sight_of(seen)
+            if index >= 0:
+                account.owner[index] = row
+            self._see(account, row, seen, index)
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
-            if row < 0:
+            if row == HELD:
+                account.owner[column] = -1
+            elif row < 0:
                 if sight.figure.seen.area < NEW_AREA:
                     continue
-                person = Person(self._next, places[column], time)
-                self._next += 1
-                self.people.append(person)
-                account.owner[column] = len(account.people)
-                account.people.append(person)
-                sure = True
-            else:
-                person = account.people[row]
-                person.moved_to(places[column], time)
-                others = np.delete(account.odds[:, column], row)
-                rival = max(0.0, float(others.max())) if len(others) else 0.0
-                sure = account.odds[row, column] - rival > SURE
-            if not sure:
-                continue
-            figure = sight.figure
-            person.upright |= upright(figure.seen, k, figure.top)
-            if sight.view.top is not None and sight.view.top > 1.2:
-                person.gallery.learn_height(sight.view.top)
-            alone = all(
-                other is places[column]
-                or abs(other[0] - places[column][0]) > ALONE
-                for other in places
-            )
-            whole = figure.seen.area > WHOLE and not figure.seen.cut.top and alone
-            if whole or not person.gallery.views:
-                person.gallery.learn(sight.view)
+                account.owner[column] = len(people)
+                people.append(self.welcome(sight.figure.place, time))
+                self._see(account, len(people) - 1, sight.figure.seen, column)
+            elif people[row].number not in targets:
+                self._see(account, row, sight.figure.seen, column)
+
+    def _see(self, account: Account, row: int, seen: Silhouette, index: int) -> None:
+        """Take one sighting of one person."""
+        person, scene = account.people[row], account.scene
+        place = account.place(seen)
+        if account.time > person.seen_at:
+            person.moved_to(place, account.time)
+        view = account.look(seen)
+        if index >= 0 and row < len(account.odds):
+            others = np.delete(account.odds[:, index], row)
+            rival = max(0.0, float(others.max())) if len(others) else 0.0
+            if account.odds[row, index] - rival < SURE:
+                return
+        person.upright |= upright(seen, scene.view.intrinsics, view.top)
+        if view.top is not None and view.top > 1.2:
+            person.gallery.learn_height(view.top)
+        alone = all(
+            number == index or abs(other.figure.place[0] - place[0]) > ALONE
+            for number, other in enumerate(account.sights)
+        )
+        whole = seen.area > WHOLE and not seen.cut.top and alone
+        if whole or not person.gallery.views:
+            person.gallery.learn(view)

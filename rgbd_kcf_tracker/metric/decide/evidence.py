@@ -37,6 +37,9 @@ class Evidence:
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
+        look: log-odds of its look by the target's gallery.
+        rival: log-odds that it is somebody else, at least 0.
+        room: share of its pixels that stood still before, for a target that has walked.
     """
 
     step: float
@@ -49,6 +52,9 @@ class Evidence:
     hidden: float
     missing: bool
     inland: float
+    look: float
+    rival: float
+    room: float
 
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
@@ -75,6 +81,11 @@ class Evidence:
                 away * less,
                 float(self.missing),
                 away * self.inland,
+                self.look,
+                away * self.look,
+                min(self.rival, 8.0),
+                away * min(self.rival, 8.0),
+                self.room,
                 1.0,
             )
         )
@@ -83,7 +94,7 @@ class Evidence:
 WEIGHTS = np.array(
     (
         -0.651, -1.680, -0.117, -6.946, -2.522, -1.543, -1.486, -2.365, -3.623, 0.641,
-        -0.230, -1.093, -1.874, 0.363, 0.859, -0.489, -3.048, 6.541,
+        -0.230, -1.093, -1.874, 0.363, 0.859, -0.489, -3.048, 0.3, 0.5, -0.1, -0.3, -2.0, 6.541,
     )
 )  # fmt: skip
 

@@ -60,7 +60,12 @@ class Person:
     @property
     def alive(self) -> bool:
         """Whether this is surely somebody and not a thing that was moved or a door that opened."""
-        return self.chosen or self.upright or self.travelled > TRAVELLED
+        return self.chosen or self.upright or self.walked
+
+    @property
+    def walked(self) -> bool:
+        """Whether it has left its first place, so that what stands still is not it."""
+        return self.travelled > TRAVELLED
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""

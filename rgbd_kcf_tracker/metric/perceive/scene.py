@@ -83,14 +83,13 @@ class SceneReader:
         self._floors = FloorFinder(seed)
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
-        self._stamp_ns = 0
         self._light = Light()
         self.room = Room()
         self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
 
-    def read(self, frame: Frame) -> Scene | None:
-        """The scene of a frame, or None where it has no depth."""
+    def read(self, frame: Frame, seconds: float) -> Scene | None:
+        """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
         view = DepthView.of(frame, self._width)
         if view is None:
             return None
@@ -106,8 +105,6 @@ class SceneReader:
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
-        seconds = max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0)
-        self._stamp_ns = frame.stamp_ns
         if self.room.depth.shape != view.shape:
             self.room.restart(
                 view.depth, upright_people(view, surfaces, elevation, self._rim)
