@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Pose
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
 from rgbd_kcf_tracker.metric.decide.crowd import Account
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
@@ -131,6 +131,10 @@ class BySurface:
         """
         scene = account.scene
         following = self.hidden_for == 0.0
+        if isinstance(scene.motion, Pose):
+            self.motion.carried(scene.motion)
+            if self._cloud is not None:
+                self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
         self._bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
         if following:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
@@ -186,6 +187,9 @@ class Crowd:
 
     def explain(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
+        if isinstance(scene.motion, Pose):
+            for person in self.people:
+                person.carried(scene.motion, scene.ahead)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 
 FloatArray = npt.NDArray[np.float64]
@@ -82,6 +83,21 @@ class Person:
         density = np.exp(-0.5 * away / variance) / (2 * np.pi * variance)
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
+
+    def carried(self, motion: Pose, ahead: FloatArray) -> None:
+        """Keep the place in the world while the camera moves.
+
+        Args:
+            motion: the pose of the last camera's frame in that of now.
+            ahead: ``(3,)`` unit vector along the floor away from the camera.
+        """
+        across = np.array([1.0, 0.0, 0.0])
+        floor = np.stack((across, ahead))
+        turned = floor @ motion.rotation @ floor.T
+        shift = floor @ motion.translation
+        self.place = turned @ self.place + shift
+        self.first_place = turned @ self.first_place + shift
+        self.velocity = turned @ self.velocity
 
     def moved_to(self, place: FloatArray, time: float) -> None:
         """Take a sight of it at ``place``, ``(2,)`` metres."""

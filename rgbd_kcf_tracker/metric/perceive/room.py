@@ -10,8 +10,11 @@ still and belongs to nobody becomes part of the room.
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Intrinsics, Pose
 
 DepthArray = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
@@ -23,6 +26,8 @@ camera's noise, which grows with the square of depth (Khoshelham and Elberink 20
 of outlines between depth and colour."""
 BLIND_FRAMES = 3
 """Frames without a reading after which a pixel is known to have none: a reading there is new."""
+NEAREST = 0.15
+"""Metres from the camera below which nothing is seen."""
 BLEND = 0.1
 """Share of a new reading in the room's depth."""
 SETTLE = 3.0
@@ -38,6 +43,36 @@ def tolerance(depth: DepthArray) -> DepthArray:
     allowed *= np.float32(NOISE_PER_SQUARE_METRE)
     allowed += np.float32(NOISE)
     return allowed
+
+
+def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
+    """A depth image as the moved camera sees it, ``(h, w)``, 0 where nothing is known."""
+    rows, cols = depth.shape
+    v, u = np.nonzero(depth)
+    z = depth[v, u]
+    points = np.stack(((u - k.cx) * z / k.fx, (v - k.cy) * z / k.fy, z), axis=1)
+    x, y, ahead = (points @ motion.rotation.T + motion.translation).astype(np.float32).T
+    inside = ahead > NEAREST
+    x, y, ahead = x[inside], y[inside], ahead[inside]
+    column = np.rint(x * np.float32(k.fx) / ahead + np.float32(k.cx)).astype(np.int32)
+    row = np.rint(y * np.float32(k.fy) / ahead + np.float32(k.cy)).astype(np.int32)
+    inside = (column >= 0) & (column < cols) & (row >= 0) & (row < rows)
+    place, ahead = row[inside] * cols + column[inside], ahead[inside]
+    # The nearest of those that fall on one pixel is written last.
+    order = np.argsort(-ahead)
+    seen = np.zeros(rows * cols, np.float32)
+    seen[place[order]] = ahead[order]
+    seen = seen.reshape(rows, cols)
+    # Where the view is spread, single pixels stay empty between two of the same surface.
+    beside = cv2.dilate(seen, np.ones((1, 3), np.uint8))
+    hole = (seen == 0) & (np.roll(seen, 1, 1) > 0) & (np.roll(seen, -1, 1) > 0)
+    hole[:, (0, -1)] = False
+    seen[hole] = beside[hole]
+    beside = cv2.dilate(seen, np.ones((3, 1), np.uint8))
+    hole = (seen == 0) & (np.roll(seen, 1, 0) > 0) & (np.roll(seen, -1, 0) > 0)
+    hole[(0, -1), :] = False
+    seen[hole] = beside[hole]
+    return seen
 
 
 class Room:
@@ -72,6 +107,26 @@ class Room:
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
+
+    def moved(self, motion: Pose, k: Intrinsics) -> Mask:
+        """See the room from where the camera is now.
+
+        Args:
+            motion: the pose of the last camera's frame in that of now.
+            k: of the view.
+
+        Returns:
+            ``(h, w)`` bool, the pixels of which nothing is known any more.
+        """
+        front = np.where((self.depth == 0) & (self._blind >= BLIND_FRAMES), self._front, 0)
+        self.depth = _seen_from(self.depth, motion, k)
+        self._front = _seen_from(front.astype(np.float32), motion, k)
+        unknown = self.depth == 0
+        opened = unknown & (self._front > 0)
+        self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
+        self._farther = np.zeros_like(self.depth)
+        self._still_for = np.zeros_like(self.depth)
+        return unknown & ~opened
 
     def update(self, depth: DepthArray, dt: float, somebody: Mask | None) -> None:
         """Compare the next view with the room and learn from it.

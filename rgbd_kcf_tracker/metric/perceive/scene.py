@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_image, view_lab
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
@@ -35,7 +37,9 @@ class Scene:
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         codes: ``(h, w)`` int32 colour codes.
-        lab: ``(h, w, 3)`` uint8 CIE Lab.
+        lab: ``(h, w, 3)`` uint8 CIE Lab, in the light of the first frame.
+        motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
+            where it has moved and nothing tells how.
     """
 
     view: DepthView
@@ -48,6 +52,14 @@ class Scene:
     rim: Rim
     codes: npt.NDArray[np.int32]
     lab: npt.NDArray[np.uint8]
+    motion: Pose | Lost | None
+
+    @property
+    def ahead(self) -> npt.NDArray[np.float64]:
+        """Unit vector along the floor away from the camera, ``(3,)`` in the camera's frame."""
+        if self.floor is None:
+            return np.array([0.0, 0.0, 1.0])
+        return self.floor.ahead(self.view.intrinsics)
 
     def silhouette(self, label: int) -> Silhouette:
         """One surface as a silhouette."""
@@ -84,6 +96,8 @@ class SceneReader:
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
         self._light = Light()
+        self._ego = EgoMotion()
+        self._pose: Pose | None = None
         self.room = Room()
         self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
@@ -105,15 +119,36 @@ class SceneReader:
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
-        if self.room.depth.shape != view.shape:
-            self.room.restart(
-                view.depth, upright_people(view, surfaces, elevation, self._rim)
-            )
-            self.somebody = None
-        else:
-            self.room.update(view.depth, seconds, self.somebody)
-        before = self.room.before
         image = view_image(frame.color, view.step, view.shape)
+        motion = self._move(image, view, frame.pose)
+        fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
+        if fresh:
+            people = upright_people(view, surfaces, elevation, self._rim)
+            self.room.restart(view.depth, people)
+            self._light.restart()
+        else:
+            somebody = self.somebody
+            if isinstance(motion, Pose):
+                unknown = self.room.moved(motion, view.intrinsics)
+                people = upright_people(view, surfaces, elevation, self._rim)
+                self.room.open(people & unknown, view.depth)
+                self._light.restart()
+                somebody = None
+            self.room.update(view.depth, seconds, somebody)
+        before = self.room.before
         lab = view_lab(self._light.steadied(image, ~before))
         codes = color_codes(lab)
-        return Scene(view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab)
+        return Scene(view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab, motion)
+
+    def _move(
+        self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
+    ) -> Pose | Lost | None:
+        """How the camera has moved: by its poses where both frames have one, else as it seems."""
+        last, self._pose = self._pose, now
+        before = self.room.before
+        if before.shape != view.shape:
+            before = np.zeros(view.shape, np.bool_)
+        seems = self._ego.update(image, view, before)
+        if last is None or now is None:
+            return seems
+        return last.after(now.inverse)
