@@ -116,6 +116,10 @@ class ByLook:
         self._depth = depth_in(frame, box) or self._depth
         self._unlearned = 0.0
 
+    def refuse(self) -> None:
+        """Take back what :meth:`step` found: the target is hidden."""
+        self._hidden = True
+
     def _place(self, box: Box) -> None:
         self._hidden = False
         self._cx, self._cy = box.cx, box.cy

@@ -256,7 +256,7 @@ class BySurface:
             height=_misfit(
                 seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
             ),
-            hidden=self.hidden_for,
+            gone=self.hidden_for + dt,
             missing=missing,
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
             look=claim.look,

@@ -10,6 +10,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
+from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -26,6 +27,16 @@ SUREST_LOOK = 0.9
 RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
 """Overlap of what the look finds with a surface, and for how long, to go over to the surface."""
+STANDING = 0.6
+"""Share of a box's middle that shows the room from which it is taken to be no more than that."""
+NEWCOMER = 1.5
+"""Seconds after the last look at a target without a surface in which somebody new may be it."""
+NEWCOMER_AREA = 0.1
+"""Square metres of him, at the least."""
+COVERED = 0.6
+"""Share of a newcomer's outline that lies in the target's box, at the least."""
+NEW_SCORE = 0.8
+"""Score of a box when the target has just been found to be a newcomer."""
 
 
 class Follower:
@@ -57,10 +68,14 @@ class Follower:
         self._account: Account | None = None
         self._hidden_for = 0.0
         self._agreed = 0
+        self._last_box, self._unseen = box, 0.0
+        self._mobile = False
+        self._since = crowd.time
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         if account is not None:
             self._lock(account, box)
+            self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
@@ -156,22 +171,49 @@ class Follower:
     def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
         assert self._look is not None
         look = self._look.step(frame, dt)
+        if look is not None and account is not None and self._stands(account, look.box):
+            self._look.refuse()
+            look = None
+        if look is not None:
+            self._last_box, self._unseen = look.box, 0.0
+        else:
+            self._unseen += dt
+        if account is not None and self._unseen < NEWCOMER and self._agree(account, look):
+            assert self._surface is not None
+            assert self.seen is not None
+            box = outline_box(account.scene, self.seen)
+            return self._tracked(frame, box, NEW_SCORE, self.seen.depth)
         if look is None:
-            self._agreed = 0
             return self._hidden(dt)
-        if account is not None:
-            self._agree(account, look.box)
         return self._tracked(frame, look.box, _score(look), look.depth)
 
-    def _agree(self, account: Account, box: Box) -> None:
-        """Go over to the surface once one has borne out the look for some frames."""
-        seen = BySurface.surface_of(account, box)
-        if seen is not None and BySurface.outline(account.scene, seen).iou(box) > RELOCK_IOU:
+    def _stands(self, account: Account, box: Box) -> bool:
+        """Whether a target that can move by itself would be what has always stood there."""
+        return self._mobile and _room_share(account, box) > STANDING
+
+    def _agree(self, account: Account, look: Look | None) -> bool:
+        """Go over to the surface once one has borne out the look, or somebody new is there."""
+        for column, sight in enumerate(account.sights):
+            row = account.owner[column]
+            if row >= 0 and account.people[row].first_seen < self._since:
+                continue
+            outline = BySurface.outline(account.scene, sight.figure.seen)
+            common = outline.intersection(self._last_box)
+            if common > COVERED * outline.area and sight.figure.seen.area > NEWCOMER_AREA:
+                self._lock(account, outline)
+                return self._surface is not None
+        if look is None:
+            self._agreed = 0
+            return False
+        seen = BySurface.surface_of(account, look.box)
+        if seen is not None and BySurface.outline(account.scene, seen).iou(look.box) > RELOCK_IOU:
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:
-                self._lock(account, box)
+                self._lock(account, look.box)
+                return self._surface is not None
         else:
             self._agreed = 0
+        return False
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -189,3 +231,16 @@ class Follower:
 def _score(look: Look) -> float:
     """Probability that a box found by look is right, from the response against its mean."""
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
+
+
+def _room_share(account: Account, box: Box) -> float:
+    """Share of the middle of a box that shows the room."""
+    scene = account.scene
+    rows, cols = scene.view.shape
+    middle = box.scaled(0.6)
+    step = scene.view.step
+    x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
+    y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
+    part = scene.view.depth[y0:y1, x0:x1] > 0
+    part &= ~scene.before[y0:y1, x0:x1]
+    return float(part.mean()) if part.size else 0.0

@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -25,14 +26,14 @@ NEW = 0.0
 """Log-odds of being somebody known from which a figure is not somebody new."""
 SURE = 1.0
 """Log-odds by which an identity must be ahead of all others to be learned from."""
-ALONE = 0.35
-"""Metres beside a figure in which nobody else may be, for its view to be learned."""
 WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
 NEW_SCORE = 0.5
 """Score of somebody who has just come into view."""
+SETTLED = 3
+"""Frames after which the room is known."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
 MOST = 0.5
@@ -74,6 +75,7 @@ class Account:
         sights: what stands before the room, ``n`` of them.
         people: all who are known, ``m`` of them.
         odds: ``(m, n)`` log-odds of each being each.
+        settled: whether the room has been seen for long enough to tell what stands before it.
         owner: for each sight the index among ``people``, or -1.
     """
 
@@ -82,6 +84,7 @@ class Account:
     sights: list[Sight]
     people: list[Person]
     odds: FloatArray
+    settled: bool
     owner: list[int] = field(default_factory=list)
     _which: npt.NDArray[np.int16] | None = None
 
@@ -157,11 +160,14 @@ class Crowd:
 
     Attributes:
         people: all who are known.
+        time: seconds of the last frame.
     """
 
     def __init__(self) -> None:
         self.people: list[Person] = []
+        self.time = 0.0
         self._next = 1
+        self._frames = 0
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
@@ -187,13 +193,18 @@ class Crowd:
 
     def explain(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
+        self.time = time
+        self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
         if isinstance(scene.motion, Pose):
             for person in self.people:
                 person.carried(scene.motion, scene.ahead)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
-        account = Account(scene, time, sights, list(self.people), self._odds(sights, time))
+        settled = self._frames > SETTLED
+        account = Account(
+            scene, time, sights, list(self.people), self._odds(sights, time), settled
+        )
         account.owner = [-1] * len(sights)
         if account.odds.size:
             rows, columns = linear_sum_assignment(-np.maximum(account.odds - NEW, 0))
@@ -263,10 +274,7 @@ class Crowd:
         person.upright |= upright(seen, scene.view.intrinsics, view.top)
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
-        alone = all(
-            number == index or abs(other.figure.place[0] - place[0]) > ALONE
-            for number, other in enumerate(account.sights)
-        )
+        alone = index < 0 or not account.sights[index].figure.parted
         whole = seen.area > WHOLE and not seen.cut.top and alone
         if whole or not person.gallery.views:
             person.gallery.learn(view)

@@ -19,6 +19,8 @@ OTHER_COLORS = 0.2
 """Loss of likeness from which it is another colour rather than another light."""
 FADE = 1.0
 """Seconds after which a hidden target's last place says a third of what it said."""
+AWAY = 0.5
+"""Seconds after which two thirds of what holds for a target that is followed no longer holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,7 @@ class Evidence:
         kin: how well it fits a thing that was seen beside the target, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
         height: squared-error term of its height, at most 0; 0 where it fits or is cut off.
-        hidden: seconds since the target was last seen; 0 while it is followed.
+        gone: seconds since the target was last seen, the step to this frame included.
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
@@ -49,7 +51,7 @@ class Evidence:
     kin: float
     fraction: float
     height: float
-    hidden: float
+    gone: float
     missing: bool
     inland: float
     look: float
@@ -58,8 +60,8 @@ class Evidence:
 
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
-        near = float(np.exp(-self.hidden / FADE))
-        away = 1.0 if self.hidden > 0 else 0.0
+        near = float(np.exp(-self.gone / FADE))
+        away = 1.0 - float(np.exp(-self.gone / AWAY))
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -75,7 +77,7 @@ class Evidence:
                 less,
                 max(self.height, -8.0),
                 away,
-                np.log1p(self.hidden),
+                np.log1p(self.gone),
                 away * self.known,
                 away * self.kin,
                 away * less,
@@ -93,8 +95,9 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.651, -1.680, -0.117, -6.946, -2.522, -1.543, -1.486, -2.365, -3.623, 0.641,
-        -0.230, -1.093, -1.874, 0.363, 0.859, -0.489, -3.048, 0.3, 0.5, -0.1, -0.3, -2.0, 6.541,
+        -0.586, -1.361, -0.014, -5.745, -1.048, -2.696, -1.419, -0.376, -2.050, 0.159,
+        1.584, -0.826, -0.095, 0.395, -0.091, -0.145, -3.008, 0.452, -0.097, -0.334,
+        -0.192, -2.442, 3.700,
     )
 )  # fmt: skip
 

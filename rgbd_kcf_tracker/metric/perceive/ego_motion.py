@@ -37,8 +37,9 @@ LEAST_AGREEING = 0.4
 AGREE = 1.5
 """Pixels of the view within which a corner agrees."""
 ITERATIONS = 8
-STILL = 0.3
-"""Pixels of median flow up to which the camera stands still."""
+STILL, LEAST_STILL = 0.3, 0.35
+"""Pixels of flow up to which a corner stands still, and the share of them from which the camera
+does: somebody may have stepped before the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,8 @@ def _told(
     second = found.reshape(-1, 2)[good].astype(np.float64)
     if len(first) < LEAST_CORNERS:
         return Lost()
-    if float(np.median(np.abs(second - first).max(axis=1))) < STILL:
+    still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
+    if still >= max(LEAST_CORNERS, LEAST_STILL * len(first)):
         return None
     k = last_view.intrinsics
     z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)

@@ -61,11 +61,13 @@ class Figure:
         seen: the silhouette.
         top: metres above the floor of its upper end; None where no floor is known or it is cut off.
         place: ``(2,)`` metres across and along the floor from the camera.
+        parted: whether it was cut out of a figure of several, so that its outline is a guess.
     """
 
     seen: Silhouette
     top: float | None
     place: FloatArray
+    parted: bool
 
 
 def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
@@ -84,8 +86,9 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        for part_left, part_top, mask in _parted(scene, left, top, member[crop], expected):
-            figure = _figure(scene, part_left, part_top, mask)
+        parts = _parted(scene, left, top, member[crop], expected)
+        for part_left, part_top, mask in parts:
+            figure = _figure(scene, part_left, part_top, mask, len(parts) > 1)
             if figure is not None:
                 found.append(figure)
     return found
@@ -237,7 +240,7 @@ def _heads(
     return np.stack((across[heads], deep[heads]), axis=1)
 
 
-def _figure(scene: Scene, left: int, top: int, mask: Mask) -> Figure | None:
+def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figure | None:
     seen = Silhouette.of(scene.view, left, top, mask, 0, scene.rim)
     cut_off = seen.cut.any
     if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
@@ -250,4 +253,4 @@ def _figure(scene: Scene, left: int, top: int, mask: Mask) -> Figure | None:
     left_end, _, right_end, _ = seen.metres
     ahead = float(scene.forward[seen.rows, seen.cols][mask].mean())
     place = np.array([(left_end + right_end) / 2, ahead])
-    return Figure(seen, None if seen.cut.top else highest, place)
+    return Figure(seen, None if seen.cut.top else highest, place, parted)

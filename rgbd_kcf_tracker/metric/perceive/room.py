@@ -32,6 +32,8 @@ BLEND = 0.1
 """Share of a new reading in the room's depth."""
 SETTLE = 3.0
 """Seconds for which something that is nobody's must have stood still to become part of the room."""
+AGREEING = 0.5
+"""Share of readings where they were from which the camera stands where it stood."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
@@ -107,6 +109,14 @@ class Room:
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
+
+    def agrees(self, depth: DepthArray) -> bool:
+        """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
+        if depth.shape != self.depth.shape:
+            return False
+        both = (depth > 0) & (self.depth > 0)
+        same = np.abs(depth - self.depth)[both] <= 0.5 * tolerance(depth)[both]
+        return bool(same.size and same.mean() > AGREEING)
 
     def moved(self, motion: Pose, k: Intrinsics) -> Mask:
         """See the room from where the camera is now.

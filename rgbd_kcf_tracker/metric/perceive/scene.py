@@ -121,6 +121,8 @@ class SceneReader:
         self._rim = rim if self._rim is None else rim.common(self._rim)
         image = view_image(frame.color, view.step, view.shape)
         motion = self._move(image, view, frame.pose)
+        if isinstance(motion, Lost) and self.room.agrees(view.depth):
+            motion = None
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
             people = upright_people(view, surfaces, elevation, self._rim)
