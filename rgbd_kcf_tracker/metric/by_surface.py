@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box, Pose
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
-from rgbd_kcf_tracker.metric.decide.crowd import Account
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
@@ -165,9 +165,20 @@ class BySurface:
                     break
         best = self.candidates[0] if self.candidates else None
         parameters = self._parameters
-        if best is None or best.probability < parameters.acceptance:
+        if best is None or best.probability < (
+            parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
+        ):
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
+
+    def resume(self, found: Candidate) -> None:
+        """Forget where the target went: it has come back elsewhere."""
+        self.motion = MotionFilter(
+            found.placed.position,
+            FIRST_SIGMA,
+            self._parameters.speed,
+            np.full(3, self._parameters.acceleration),
+        )
 
     def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
@@ -249,7 +260,6 @@ class BySurface:
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
-            pale=max(0.0, body.likeness - placed.likeness) if self._parameters.use_color else 0.0,
             known=known,
             kin=kin,
             fraction=placed.fraction,
@@ -259,7 +269,7 @@ class BySurface:
             gone=self.hidden_for + dt,
             missing=missing,
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
-            look=claim.look,
+            look=claim.look if self._parameters.use_color else 0.0,
             rival=claim.rival,
             room=claim.room if self._person.walked else 0.0,
         )

@@ -9,7 +9,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
-from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
@@ -27,6 +27,9 @@ SUREST_LOOK = 0.9
 RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
 """Overlap of what the look finds with a surface, and for how long, to go over to the surface."""
+RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
+"""Sightings of a returning target, and seconds of them, after which it is the target for good, and
+the mean log-odds of its look that it takes."""
 STANDING = 0.6
 """Share of a box's middle that shows the room from which it is taken to be no more than that."""
 NEWCOMER = 1.5
@@ -140,11 +143,28 @@ class Follower:
         found = surface.step(account, dt)
         if found is None:
             return self._glance(frame, account.scene, view, dt, surface)
+        stranger = None
+        if surface.hidden_for > REUNION and self.person is not None:
+            stranger = account.stranger(self.person, account.sight_of(found.seen))
+        if stranger is not None:
+            if not self._recognised(stranger, account.time):
+                box = surface.box(account.scene, found)
+                surface.miss(account.scene, dt)
+                return self._tracked(frame, box, found.probability, found.seen.depth)
+            surface.resume(found)
         box = surface.take(account.scene, found, dt)
         self.seen = found.seen
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, found.probability, found.seen.depth)
+
+    def _recognised(self, stranger: Person, time: float) -> bool:
+        """Whether enough was seen of somebody to say for good that he is the target."""
+        assert self.person is not None
+        alike = stranger.resemblance(self.person.number)
+        if alike is None or stranger.sightings < RECOGNISED_SIGHTINGS:
+            return False
+        return time - stranger.first_seen >= RECOGNISED_AFTER and alike > RECOGNISED_ODDS
 
     def _glance(
         self,

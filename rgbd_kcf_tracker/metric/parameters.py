@@ -54,6 +54,12 @@ class MetricParameters(Parameters):
         minimum=0.01,
         maximum=0.99,
     )
+    recognition: float = parameter(
+        0.65,
+        'The same after an absence of a second or more: a stranger is worse than no box.',
+        minimum=0.01,
+        maximum=0.99,
+    )
     least_visible: float = parameter(
         0.17,
         'Share of the body below which it counts as hidden.',

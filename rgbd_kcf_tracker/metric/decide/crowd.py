@@ -38,6 +38,8 @@ HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
 MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure."""
+REUNION = 1.0
+"""Seconds of absence after which somebody who was chosen is recognised by more than his place."""
 RECENT = 0.6
 """Seconds after the last sight for which a figure is parted where somebody is expected."""
 
@@ -56,7 +58,8 @@ class Claim:
 
     Attributes:
         look: log-odds that its look is the target's.
-        rival: log-odds that it is somebody else, at least 0: somebody new is always possible.
+        rival: log-odds that it is somebody else who was seen beside the target, at least 0:
+            somebody new is always possible.
         room: share of its pixels that are the room, 0 to 1.
     """
 
@@ -75,6 +78,7 @@ class Account:
         sights: what stands before the room, ``n`` of them.
         people: all who are known, ``m`` of them.
         odds: ``(m, n)`` log-odds of each being each.
+        looks: ``(m, n)`` the part of the look and the height in them.
         settled: whether the room has been seen for long enough to tell what stands before it.
         owner: for each sight the index among ``people``, or -1.
     """
@@ -84,6 +88,7 @@ class Account:
     sights: list[Sight]
     people: list[Person]
     odds: FloatArray
+    looks: FloatArray
     settled: bool
     owner: list[int] = field(default_factory=list)
     _which: npt.NDArray[np.int16] | None = None
@@ -135,15 +140,32 @@ class Account:
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``."""
-        look = person.gallery.log_odds(self.look(seen))
         index = self.sight_of(seen)
+        look = None
+        stranger = self.stranger(person, index)
+        if stranger is not None:
+            look = stranger.resemblance(person.number)
+        if look is None:
+            look = person.gallery.log_odds(self.look(seen))
         rival = 0.0
         if index >= 0:
             for row, other in enumerate(self.people[: len(self.odds)]):
-                if other is not person:
+                if other.number in person.met:
                     rival = max(rival, float(self.odds[row, index]))
         before = self.scene.before[seen.rows, seen.cols][seen.mask]
         return Claim(look, rival, 1.0 - np.count_nonzero(before) / len(before))
+
+    def stranger(self, person: Person, index: int) -> Person | None:
+        """Who a sight is taken for, if that may be ``person`` under another number.
+
+        That is somebody who was never seen beside him.
+        """
+        if index < 0 or self.owner[index] < 0:
+            return None
+        other = self.people[self.owner[index]]
+        if other is person or other.chosen or other.number in person.met:
+            return None
+        return other
 
     def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
@@ -202,27 +224,39 @@ class Crowd:
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
         settled = self._frames > SETTLED
-        account = Account(
-            scene, time, sights, list(self.people), self._odds(sights, time), settled
-        )
+        odds, looks = self._odds(sights, time)
+        account = Account(scene, time, sights, list(self.people), odds, looks, settled)
         account.owner = [-1] * len(sights)
-        if account.odds.size:
-            rows, columns = linear_sum_assignment(-np.maximum(account.odds - NEW, 0))
+        if odds.size:
+            # Whoever was chosen and has been away comes back as a stranger first, until his looks
+            # have borne out over some sightings who he is.
+            away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
+            open_odds = np.where(np.array(away)[:, None], NEW - 1, odds)
+            rows, columns = linear_sum_assignment(-np.maximum(open_odds - NEW, 0))
             for row, column in zip(rows, columns, strict=True):
-                if account.odds[row, column] > NEW:
+                if open_odds[row, column] > NEW:
                     account.owner[column] = int(row)
+                    self._compare(account, int(row), column)
         return account
 
-    def _odds(self, sights: list[Sight], time: float) -> FloatArray:
+    def _compare(self, account: Account, row: int, column: int) -> None:
+        """Compare a sight of one person with those who were chosen and are away."""
+        for other, person in enumerate(account.people[: len(account.looks)]):
+            if person.chosen and other != row and account.time - person.seen_at > REUNION:
+                account.people[row].resembled(person.number, float(account.looks[other, column]))
+
+    def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
         odds = np.zeros((len(self.people), len(sights)))
+        looks = np.zeros_like(odds)
         if not odds.size:
-            return odds
+            return odds, looks
         places = np.stack([s.figure.place for s in sights])
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
             for column, sight in enumerate(sights):
-                odds[row, column] += person.gallery.log_odds(sight.view)
-        return odds
+                looks[row, column] = person.gallery.log_odds(sight.view)
+        odds += looks
+        return odds, looks
 
     def learn(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
         """Take what was seen.
@@ -244,6 +278,7 @@ class Crowd:
                 continue
             index = account.sight_of(seen)
             if index >= 0:
+                self._merge(account, row, account.owner[index])
                 account.owner[index] = row
             self._see(account, row, seen, index)
         for column, sight in enumerate(account.sights):
@@ -256,8 +291,24 @@ class Crowd:
                 account.owner[column] = len(people)
                 people.append(self.welcome(sight.figure.place, time))
                 self._see(account, len(people) - 1, sight.figure.seen, column)
+                self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
+        seen_now = {people[row].number for row in account.owner if row >= 0}
+        seen_now |= {number for number, seen in targets.items() if seen is not None}
+        for person in people:
+            if person.number in seen_now:
+                person.met |= seen_now - {person.number}
+
+    def _merge(self, account: Account, row: int, other: int) -> None:
+        """Drop the number under which a target was known while it was not recognised."""
+        if other < 0 or other == row:
+            return
+        person, double = account.people[row], account.people[other]
+        if double.number in person.met or double.chosen:
+            return
+        if double in self.people:
+            self.people.remove(double)
 
     def _see(self, account: Account, row: int, seen: Silhouette, index: int) -> None:
         """Take one sighting of one person."""

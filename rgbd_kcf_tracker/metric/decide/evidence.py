@@ -15,8 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-OTHER_COLORS = 0.2
-"""Loss of likeness from which it is another colour rather than another light."""
 FADE = 1.0
 """Seconds after which a hidden target's last place says a third of what it said."""
 AWAY = 0.5
@@ -30,7 +28,6 @@ class Evidence:
     Attributes:
         step: squared Mahalanobis distance from where the target was expected.
         stride: the same for a target that may also have moved at will.
-        pale: by how much its colours are less like the target's than they mostly are, 0 to 1.
         known: share of its pixels that were seen beside the target, 0 to 1.
         kin: how well it fits a thing that was seen beside the target, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
@@ -46,7 +43,6 @@ class Evidence:
 
     step: float
     stride: float
-    pale: float
     known: float
     kin: float
     fraction: float
@@ -62,6 +58,7 @@ class Evidence:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
         near = float(np.exp(-self.gone / FADE))
         away = 1.0 - float(np.exp(-self.gone / AWAY))
+        look, rival = min(max(self.look, -6.0), 5.0), min(self.rival, 8.0)
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -69,8 +66,6 @@ class Evidence:
                 np.log1p(self.step) * near,
                 np.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
-                self.pale,
-                max(0.0, self.pale - OTHER_COLORS),
                 self.known,
                 self.kin,
                 more**2,
@@ -83,11 +78,12 @@ class Evidence:
                 away * less,
                 float(self.missing),
                 away * self.inland,
-                self.look,
-                away * self.look,
-                min(self.rival, 8.0),
-                away * min(self.rival, 8.0),
+                look,
+                away * look,
+                rival,
+                away * rival,
                 self.room,
+                away * self.room,
                 1.0,
             )
         )
@@ -95,9 +91,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.586, -1.361, -0.014, -5.745, -1.048, -2.696, -1.419, -0.376, -2.050, 0.159,
-        1.584, -0.826, -0.095, 0.395, -0.091, -0.145, -3.008, 0.452, -0.097, -0.334,
-        -0.192, -2.442, 3.700,
+        -0.60, -1.05, -0.03, -3.08, -1.30, -0.88, -2.45, 0.07, -4.35, 0.38, -1.75, -2.17,
+        1.24, -0.49, -1.65, 1.03, -0.21, -0.36, -0.62, -2.10, 1.47, 5.05,
     )
 )  # fmt: skip
 

@@ -46,6 +46,7 @@ class Person:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
         upright: whether it ever had the shape of a person.
+        met: numbers of those who were seen at the same time, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
     """
 
@@ -56,6 +57,8 @@ class Person:
         self.seen_at = self.first_seen = time
         self.sightings = 1
         self.upright = False
+        self.met: set[int] = set()
+        self._resembles: dict[int, tuple[float, int]] = {}
         self.gallery = Gallery()
 
     @property
@@ -83,6 +86,16 @@ class Person:
         density = np.exp(-0.5 * away / variance) / (2 * np.pi * variance)
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
+
+    def resembled(self, other: int, odds: float) -> None:
+        """Take log-odds of a sighting of this one to look like another, who is not in view."""
+        total, count = self._resembles.get(other, (0.0, 0))
+        self._resembles[other] = total + odds, count + 1
+
+    def resemblance(self, other: int) -> float | None:
+        """Mean log-odds, over all sightings, of looking like another; None if never compared."""
+        total, count = self._resembles.get(other, (0.0, 0))
+        return total / count if count else None
 
     def carried(self, motion: Pose, ahead: FloatArray) -> None:
         """Keep the place in the world while the camera moves.
