@@ -40,6 +40,9 @@ GROWN, SHRUNK = 0.3, 0.35
 PLACED_MIDDLE = 0.4
 LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
+STANDING = 0.7
+"""Share of a candidate that always stood there from which it is no target that came from
+elsewhere."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
 
@@ -152,6 +155,7 @@ class BySurface:
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in found]
+        self.candidates = [c for c in self.candidates if c.evidence.room < STANDING]
         self.candidates.sort(key=lambda c: -c.probability)
         for candidate in self.candidates[:2]:
             whole = gathered(scene, self.body, candidate.seen, candidate.placed, self._bystanders)
@@ -271,7 +275,7 @@ class BySurface:
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
             look=claim.look if self._parameters.use_color else 0.0,
             rival=claim.rival,
-            room=claim.room if self._person.walked else 0.0,
+            room=claim.room,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 

@@ -30,6 +30,8 @@ WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
+PART_OF_ROOM = 0.3
+"""Share of a silhouette that shows the room up to which it stands before it."""
 NEW_SCORE = 0.5
 """Score of somebody who has just come into view."""
 SETTLED = 3
@@ -60,7 +62,7 @@ class Claim:
         look: log-odds that its look is the target's.
         rival: log-odds that it is somebody else who was seen beside the target, at least 0:
             somebody new is always possible.
-        room: share of its pixels that are the room, 0 to 1.
+        room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
     """
 
     look: float
@@ -152,8 +154,28 @@ class Account:
             for row, other in enumerate(self.people[: len(self.odds)]):
                 if other.number in person.met:
                     rival = max(rival, float(self.odds[row, index]))
+        return Claim(look, rival, self._room_beside(person, seen))
+
+    def room_share(self, seen: Silhouette) -> float:
+        """Share of a silhouette's pixels that show the room, 0 to 1."""
         before = self.scene.before[seen.rows, seen.cols][seen.mask]
-        return Claim(look, rival, 1.0 - np.count_nonzero(before) / len(before))
+        return 1.0 - np.count_nonzero(before) / len(before)
+
+    def _room_beside(self, person: Person, seen: Silhouette) -> float:
+        """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
+        share = self.room_share(seen)
+        last = person.last
+        if person.mobile or share == 0:
+            return share
+        if last is None:
+            return 0.0
+        y0, y1 = max(seen.rows.start, last.rows.start), min(seen.rows.stop, last.rows.stop)
+        x0, x1 = max(seen.cols.start, last.cols.start), min(seen.cols.stop, last.cols.stop)
+        if y0 >= y1 or x0 >= x1:
+            return share
+        mine = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
+        # What the outline of the last sight holds may have been the person.
+        return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.
@@ -217,6 +239,9 @@ class Crowd:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
         self.time = time
         self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
+        if isinstance(scene.motion, Lost):
+            for person in self.people:
+                person.mobile, person.last = False, None
         if isinstance(scene.motion, Pose):
             for person in self.people:
                 person.carried(scene.motion, scene.ahead)
@@ -316,6 +341,8 @@ class Crowd:
         place = account.place(seen)
         if account.time > person.seen_at:
             person.moved_to(place, account.time)
+        person.last = seen
+        person.mobile |= account.settled and account.room_share(seen) < PART_OF_ROOM
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
             others = np.delete(account.odds[:, index], row)

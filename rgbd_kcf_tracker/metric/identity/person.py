@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -45,6 +46,8 @@ class Person:
     Attributes:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
+        mobile: whether it was seen before a room that is known, so that what stands still is not it.
+        last: the silhouette of the last sight, None where the camera has moved since.
         upright: whether it ever had the shape of a person.
         met: numbers of those who were seen at the same time, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
@@ -56,20 +59,16 @@ class Person:
         self.first_place, self.travelled = place.copy(), 0.0
         self.seen_at = self.first_seen = time
         self.sightings = 1
-        self.upright = False
+        self.upright = self.mobile = False
         self.met: set[int] = set()
+        self.last: Silhouette | None = None
         self._resembles: dict[int, tuple[float, int]] = {}
         self.gallery = Gallery()
 
     @property
     def alive(self) -> bool:
         """Whether this is surely somebody and not a thing that was moved or a door that opened."""
-        return self.chosen or self.upright or self.walked
-
-    @property
-    def walked(self) -> bool:
-        """Whether it has left its first place, so that what stands still is not it."""
-        return self.travelled > TRAVELLED
+        return self.chosen or self.upright or self.travelled > TRAVELLED
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""
@@ -106,6 +105,7 @@ class Person:
         """
         across = np.array([1.0, 0.0, 0.0])
         floor = np.stack((across, ahead))
+        self.last = None
         turned = floor @ motion.rotation @ floor.T
         shift = floor @ motion.translation
         self.place = turned @ self.place + shift
