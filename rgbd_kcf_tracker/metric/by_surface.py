@@ -16,7 +16,6 @@ from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
-from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
@@ -78,8 +77,6 @@ class BySurface:
         self._person = person
         scene = account.scene
         self.body = Body(first)
-        self._bystanders = Bystanders()
-        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
         placed = self.body.place(first, scene.codes, scene.view, here, None)
@@ -94,8 +91,7 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         self.candidates: list[Candidate] = []
         self.body.learn_colors(placed, None)
-        self._remember(scene, first)
-        self._learn_around(scene, None)
+        self._learn_around(scene, first, None)
 
     @staticmethod
     def surface_of(account: Account, box: Box) -> Silhouette | None:
@@ -139,16 +135,14 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
-        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
         if following:
             self._cloud = None
         elif self._parameters.use_particles:
             self._step_cloud(scene, dt)
         expected = self._expected(dt)
         missing = self._should_be_seen(scene) > 0.6
-        found = propose(
-            scene, self.body, expected, self._bystanders, self._parameters.most_candidates
-        )
+        others = account.others(self._person)
+        found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
         found += [
             sight.figure.seen
             for sight in account.sights
@@ -158,7 +152,7 @@ class BySurface:
         self.candidates = [c for c in self.candidates if c.evidence.room < STANDING]
         self.candidates.sort(key=lambda c: -c.probability)
         for candidate in self.candidates[:2]:
-            whole = gathered(scene, self.body, candidate.seen, candidate.placed, self._bystanders)
+            whole = gathered(scene, self.body, candidate.seen, candidate.placed, others)
             if whole is None:
                 continue
             more = self._weighed(account, whole, dt, missing)
@@ -193,11 +187,10 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
-        self._remember(scene, seen)
         self.body.grow(seen)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
             self.body.learn_colors(placed, dt)
-            self._learn_around(scene, dt)
+            self._learn_around(scene, seen, dt)
             self.body.learn_size(seen, dt)
         return self.box(scene, found)
 
@@ -207,8 +200,6 @@ class BySurface:
             self._gone = max(self._gone, self._outside(scene))
         self.hidden_for += dt
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
-        if scene is not None:
-            self._remember(scene, None)
 
     def seen_elsewhere(self, view: DepthView, box: Box) -> None:
         """Take a box of the image that was found by other means: it tells all but the depth."""
@@ -258,14 +249,9 @@ class BySurface:
         else:
             step = float((away / variance).sum())
         at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
-        known, kin = self._bystanders.of(seen, scene.surfaces)
-        if not self._parameters.use_bystanders:
-            known = kin = 0.0
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
-            known=known,
-            kin=kin,
             fraction=placed.fraction,
             height=_misfit(
                 seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
@@ -274,8 +260,9 @@ class BySurface:
             missing=missing,
             inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
             look=claim.look if self._parameters.use_color else 0.0,
-            rival=claim.rival,
-            room=claim.room,
+            mine=claim.mine if self._parameters.use_others else 0.0,
+            rival=claim.rival if self._parameters.use_others else 0.0,
+            room=claim.room if self._parameters.use_room else 0.0,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 
@@ -338,36 +325,7 @@ class BySurface:
         left, top, right, bottom = (v * view.step for v in self._outline(view))
         return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))
 
-    def _remember(self, scene: Scene, target: Silhouette | None) -> None:
-        possible = self._may_come_out(scene)
-        for c in self.candidates:
-            if c.placed.likeness > self.body.likeness - 0.12 and c.evidence.known < 0.75:
-                possible[c.seen.label] = True
-        self._bystanders.remember(
-            scene.view,
-            scene.surfaces,
-            target,
-            self._outline_slices(scene.view),
-            possible,
-            0.05 * self.body.area,
-        )
-
-    def _may_come_out(self, scene: Scene) -> npt.NDArray[np.bool_]:
-        """Surfaces where a target that has not been hidden for long may come out, ``(n,)``."""
-        boxes = scene.surfaces.boxes
-        rows, cols = self._outline_slices(scene.view)
-        x, _, z = self.motion.sigma
-        beside = int(min(x, 0.5) * scene.view.intrinsics.fx / max(self.motion.position[2], 0.3))
-        near = np.abs(scene.surfaces.depth - self.motion.position[2]) < 0.25 + min(z, 0.25)
-        near &= (boxes[:, 0] < cols.stop + beside) & (boxes[:, 1] < rows.stop)
-        near &= boxes[:, 0] + boxes[:, 2] > cols.start - beside
-        near &= boxes[:, 1] + boxes[:, 3] > rows.start
-        result: npt.NDArray[np.bool_] = near & (
-            self.body.area * 1.7 > scene.surfaces.areas(scene.view.intrinsics)
-        )
-        return result
-
-    def _learn_around(self, scene: Scene, dt: float | None) -> None:
+    def _learn_around(self, scene: Scene, seen: Silhouette, dt: float | None) -> None:
         """Learn the colours beside the target."""
         left, top, right, bottom = self._outline(scene.view)
         rows, cols = scene.view.shape
@@ -376,7 +334,9 @@ class BySurface:
         x1 = int(np.clip(right + wide, x0 + 1, cols))
         y0 = int(np.clip(top, 0, rows - 2))
         y1 = int(np.clip(bottom, y0 + 1, rows))
-        other = self._bystanders.beside(slice(y0, y1), slice(x0, x1))
+        other = scene.view.depth > 0
+        other[seen.rows, seen.cols] &= ~seen.mask
+        other = other[y0:y1, x0:x1]
         self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:

@@ -86,7 +86,8 @@ class MetricParameters(Parameters):
     use_particles: bool = parameter(
         True, 'Carry particles while hidden, else the motion filter alone.'
     )
-    use_bystanders: bool = parameter(True, 'Refuse what was seen beside the target.')
+    use_others: bool = parameter(True, 'Refuse what is better explained as somebody else.')
+    use_room: bool = parameter(True, 'Refuse what stood still while the target was elsewhere.')
     use_color: bool = parameter(True, 'Compare the colours of candidates.')
     use_surfaces: bool = parameter(True, 'Follow surfaces in depth, else the look alone.')
     use_look: bool = parameter(

@@ -30,6 +30,9 @@ WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
+STEP, STEP_PER_SECOND = 0.3, 1.0
+"""Metres in depth by which somebody's pixels differ, and may have moved on from one sight to the
+next."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it."""
 NEW_SCORE = 0.5
@@ -60,12 +63,15 @@ class Claim:
 
     Attributes:
         look: log-odds that its look is the target's.
+        mine: log-odds, place and look together, that the figure which it is part of is the
+            target; 0 where it is part of none.
         rival: log-odds that it is somebody else who was seen beside the target, at least 0:
             somebody new is always possible.
         room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
     """
 
     look: float
+    mine: float
     rival: float
     room: float
 
@@ -149,12 +155,14 @@ class Account:
             look = stranger.resemblance(person.number)
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
-        rival = 0.0
+        rival = mine = 0.0
         if index >= 0:
             for row, other in enumerate(self.people[: len(self.odds)]):
-                if other.number in person.met:
+                if other is person:
+                    mine = float(self.odds[row, index])
+                elif other.number in person.met:
                     rival = max(rival, float(self.odds[row, index]))
-        return Claim(look, rival, self._room_beside(person, seen))
+        return Claim(look, mine, rival, self._room_beside(person, seen))
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
@@ -173,9 +181,27 @@ class Account:
         x0, x1 = max(seen.cols.start, last.cols.start), min(seen.cols.stop, last.cols.stop)
         if y0 >= y1 or x0 >= x1:
             return share
+        # What the outline of the last sight holds, about as deep, may have been the person.
         mine = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
-        # What the outline of the last sight holds may have been the person.
+        step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)
+        mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
         return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
+
+    def others(self, person: Person) -> npt.NDArray[np.bool_]:
+        """The pixels that are surely not a person's, ``(h, w)`` bool.
+
+        They belong to somebody who was seen beside him, or are the room where he is no part of it.
+        """
+        theirs = np.zeros(len(self.sights) + 1, np.bool_)
+        theirs[0] = person.mobile
+        for number, owner in enumerate(self.owner, 1):
+            theirs[number] = owner >= 0 and self.people[owner].number in person.met
+        if not theirs.any():
+            return np.zeros(self.which.shape, np.bool_)
+        mask: npt.NDArray[np.bool_] = theirs[self.which]
+        if person.mobile:
+            mask &= ~(self.scene.before & (self.which == 0))
+        return mask
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.

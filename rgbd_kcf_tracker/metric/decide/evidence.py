@@ -28,8 +28,6 @@ class Evidence:
     Attributes:
         step: squared Mahalanobis distance from where the target was expected.
         stride: the same for a target that may also have moved at will.
-        known: share of its pixels that were seen beside the target, 0 to 1.
-        kin: how well it fits a thing that was seen beside the target, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
         height: squared-error term of its height, at most 0; 0 where it fits or is cut off.
         gone: seconds since the target was last seen, the step to this frame included.
@@ -37,20 +35,20 @@ class Evidence:
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
         look: log-odds of its look by the target's gallery.
+        mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
         rival: log-odds that it is somebody else, at least 0.
         room: share of its pixels that stood still before, for a target that has walked.
     """
 
     step: float
     stride: float
-    known: float
-    kin: float
     fraction: float
     height: float
     gone: float
     missing: bool
     inland: float
     look: float
+    mine: float
     rival: float
     room: float
 
@@ -59,6 +57,7 @@ class Evidence:
         near = float(np.exp(-self.gone / FADE))
         away = 1.0 - float(np.exp(-self.gone / AWAY))
         look, rival = min(max(self.look, -6.0), 5.0), min(self.rival, 8.0)
+        mine = min(max(self.mine, -6.0), 8.0)
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -66,20 +65,18 @@ class Evidence:
                 np.log1p(self.step) * near,
                 np.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
-                self.known,
-                self.kin,
                 more**2,
                 less,
                 max(self.height, -8.0),
                 away,
                 np.log1p(self.gone),
-                away * self.known,
-                away * self.kin,
                 away * less,
                 float(self.missing),
                 away * self.inland,
                 look,
                 away * look,
+                mine,
+                away * mine,
                 rival,
                 away * rival,
                 self.room,
@@ -91,8 +88,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.60, -1.05, -0.03, -3.08, -1.30, -0.88, -2.45, 0.07, -4.35, 0.38, -1.75, -2.17,
-        1.24, -0.49, -1.65, 1.03, -0.21, -0.36, -0.62, -2.10, 1.47, 5.05,
+        -0.50, -1.30, -0.17, -1.11, -2.64, 0.16, -4.06, -0.10, 1.46, -0.50, -0.51, 0.98,
+        -0.18, 0.1, 0.2, -0.31, -0.54, -2.32, -2.12, 4.77,
     )
 )  # fmt: skip
 
