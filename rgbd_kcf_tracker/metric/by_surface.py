@@ -56,6 +56,21 @@ class Candidate:
     probability: float
 
 
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Where a target is believed to be, in the camera's optical frame.
+
+    Attributes:
+        position: metres, the middle of the body.
+        velocity: metres per second.
+        covariance: of the position, ``(3, 3)`` row by row in square metres.
+    """
+
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    covariance: tuple[float, ...]
+
+
 class BySurface:
     """Follows one target from scene to scene.
 
@@ -90,7 +105,7 @@ class BySurface:
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
         self.candidates: list[Candidate] = []
-        self.body.learn_colors(placed, None)
+        self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
         self._learn_around(scene, first, None)
 
     @staticmethod
@@ -169,6 +184,17 @@ class BySurface:
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
 
+    def belief(self) -> Belief:
+        """Where the target is believed to be now: by the particles while it is hidden."""
+        place, sigma = self.motion.position, self.motion.sigma
+        if self._cloud is not None:
+            place, sigma = self._cloud.mean, self._cloud.spread
+        middle = place + np.array([0.0, self.body.height / 2, 0.0])
+        x, y, z = (float(v) for v in middle)
+        u, v, w = (float(speed) for speed in self.motion.velocity)
+        covariance = np.diag(np.square(sigma)).ravel()
+        return Belief((x, y, z), (u, v, w), tuple(float(c) for c in covariance))
+
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
         self.motion = MotionFilter(
@@ -189,7 +215,8 @@ class BySurface:
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
-            self.body.learn_colors(placed, dt)
+            top = float(placed.position[1])
+            self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
             self._learn_around(scene, seen, dt)
             self.body.learn_size(seen, dt)
         return self.box(scene, found)

@@ -239,13 +239,28 @@ class Follower:
 
     def _hidden(self, dt: float) -> Track:
         lost = self._hidden_for + dt > self._parameters.lost_after
-        return Track(None, TrackState.LOST if lost else TrackState.OCCLUDED)
+        state = TrackState.LOST if lost else TrackState.OCCLUDED
+        if self._surface is None:
+            return Track(None, state)
+        belief = self._surface.belief()
+        return Track(None, state, covariance=belief.covariance, predicted=belief.position)
 
     def _tracked(self, frame: Frame, box: Box, score: float, depth: float | None) -> Track:
-        position = None
+        position = velocity = covariance = None
         if depth is not None and frame.intrinsics is not None:
             position = frame.intrinsics.deproject(box.cx, box.cy, depth)
-        return Track(box, TrackState.TRACKING, score, depth, position)
+            if self._surface is not None:
+                belief = self._surface.belief()
+                velocity, covariance = belief.velocity, belief.covariance
+        return Track(
+            box,
+            TrackState.TRACKING,
+            score,
+            depth,
+            position,
+            velocity=velocity,
+            covariance=covariance,
+        )
 
 
 def _score(look: Look) -> float:

@@ -21,7 +21,6 @@ from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import Follower
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
 
@@ -74,14 +73,6 @@ class MetricTargets:
         number = self._name(follower.person)
         self._followers[number] = follower
         return number
-
-    def add_point(self, frame: Frame, x: float, y: float) -> int:
-        """Follow what is seen at a pixel of ``frame``.
-
-        Raises:
-            BoxError: where nothing that could be followed is there.
-        """
-        return self.add(frame, surface_at(frame, x, y))
 
     def remove(self, number: int) -> None:
         """No longer follow the target of that id.

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.geometry import Pose
-from rgbd_kcf_tracker.metric.identity.gallery import View
+from rgbd_kcf_tracker.metric.identity.gallery import Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
@@ -37,10 +37,14 @@ PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it."""
 NEW_SCORE = 0.5
 """Score of somebody who has just come into view."""
+MOST_PEOPLE = 48
+"""People who are remembered beside the chosen ones; who was seen longest ago is forgotten."""
 SETTLED = 3
 """Frames after which the room is known."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
+SAME = 0.8
+"""Share of a figure's area from which a silhouette that is part of it looks as it does."""
 MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure."""
 REUNION = 1.0
@@ -153,6 +157,10 @@ class Account:
         stranger = self.stranger(person, index)
         if stranger is not None:
             look = stranger.resemblance(person.number)
+        if look is None and index >= 0 and person in self.people[: len(self.looks)]:
+            whole = self.sights[index].figure.seen
+            if SAME < whole.area / seen.area < 1 / SAME:
+                look = float(self.looks[self.people.index(person), index])
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
@@ -241,6 +249,9 @@ class Crowd:
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
+        others = [p for p in self.people if not p.chosen]
+        if len(others) >= MOST_PEOPLE:
+            self.people.remove(min(others, key=lambda p: (p.alive, p.seen_at)))
         person = Person(self._next, place, time, chosen)
         self._next += 1
         self.people.append(person)
@@ -302,10 +313,18 @@ class Crowd:
         if not odds.size:
             return odds, looks
         places = np.stack([s.figure.place for s in sights])
+        known = [p.gallery.looks for p in self.people if p.gallery.looks is not None]
+        everyone = Looks.joined(known) if known else None
+        starts = np.cumsum([0] + [len(each) for each in known[:-1]])
+        for column, sight in enumerate(sights):
+            best = []
+            if everyone is not None:
+                best = np.maximum.reduceat(similarity(sight.view, everyone), starts).tolist()
+            for row, person in enumerate(self.people):
+                alike = best.pop(0) if person.gallery.looks is not None else None
+                looks[row, column] = person.gallery.log_odds(sight.view, alike)
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
-            for column, sight in enumerate(sights):
-                looks[row, column] = person.gallery.log_odds(sight.view)
         odds += looks
         return odds, looks
 

@@ -118,7 +118,8 @@ def _split(
     if z < 0.2:
         return []
     large = facts.area > TOO_LARGE * body.area
-    large |= (_shares(scene, others) > MIXED) & (facts.area > body.area)
+    if others.any():
+        large |= (_shares(scene, others) > MIXED) & (facts.area > body.area)
     large[0] = False
     if not large.any():
         return []

@@ -149,7 +149,7 @@ class Looks:
     """Several views stacked, for comparing one with all of them at once.
 
     Attributes:
-        roots: ``(n, SLICES, LIGHTNESS, CHROMA * CHROMA)``.
+        roots: ``(SLICES, n * LIGHTNESS, CHROMA * CHROMA)``.
         area, color: ``(n, SLICES)``.
     """
 
@@ -157,14 +157,41 @@ class Looks:
     area: FloatArray
     color: FloatArray
 
+    def __len__(self) -> int:
+        return len(self.area)
+
     @classmethod
     def of(cls, views: Sequence[View]) -> Looks:
         """Stack at least one view."""
         return cls(
-            np.stack([v.roots for v in views]),
+            np.concatenate([v.roots for v in views], axis=1),
             np.stack([v.area for v in views]),
             np.stack([v.color for v in views]),
         )
+
+    @classmethod
+    def joined(cls, looks: Sequence[Looks]) -> Looks:
+        """Stack at least one stack."""
+        return cls(
+            np.concatenate([each.roots for each in looks], axis=1),
+            np.concatenate([each.area for each in looks]),
+            np.concatenate([each.color for each in looks]),
+        )
+
+
+def _diagonals() -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Where, in a flattened product of levels by levels, the diagonals lie and begin."""
+    cells = [
+        [level * LIGHTNESS + level + shift for level in range(LIGHTNESS)
+         if 0 <= level + shift < LIGHTNESS]
+        for shift in DIMMER
+    ]  # fmt: skip
+    starts = np.cumsum([0] + [len(each) for each in cells[:-1]])
+    return np.concatenate(cells).astype(np.intp), starts.astype(np.intp)
+
+
+_CELLS, _STARTS = _diagonals()
+_COST = (DIMMER_COST * np.abs(DIMMER)).astype(np.float32)
 
 
 def similarity(view: View, looks: Looks) -> FloatArray:
@@ -176,16 +203,13 @@ def similarity(view: View, looks: Looks) -> FloatArray:
     common = np.minimum(looks.area, view.area)
     weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
     weight[common < LEAST_SLICE] = 0
-    total = np.maximum(weight.sum(axis=1), 1e-9)
-    # All levels of one against all of the other; the shifts are its diagonals.
-    cross = np.einsum('nslc,smc->nslm', looks.roots, view.roots, optimize=True)
-    best: FloatArray | None = None
-    for shift in DIMMER:
-        alike = np.trace(cross, offset=shift, axis1=2, axis2=3)
-        mean = (weight * alike).sum(axis=1) / total - np.float32(DIMMER_COST * abs(shift))
-        best = mean if best is None else np.maximum(best, mean)
-    assert best is not None
-    return np.maximum(best, 0)
+    weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    # All levels of one against all of the other; the shifts are the diagonals of that.
+    cross = looks.roots @ view.roots.transpose(0, 2, 1)
+    cells = cross.reshape(SLICES, len(looks), LIGHTNESS * LIGHTNESS)[:, :, _CELLS]
+    alike = np.add.reduceat(cells, _STARTS, axis=2)
+    mean = np.einsum('ns,snd->nd', weight, alike) - _COST
+    return np.maximum(mean.max(axis=1), 0)
 
 
 def look_log_odds(alike: float, area: float, views: int = 1) -> float:
@@ -242,16 +266,19 @@ class Gallery:
         """Median height of the head above the floor in metres, None where it is not known."""
         return float(np.median(self._tops)) if self._tops else None
 
-    def alike(self, view: View) -> float:
-        """Likeness of a view to the most alike one of the gallery, 0 to 1; 0 without any."""
-        return float(similarity(view, self.looks).max()) if self.looks is not None else 0.0
+    def log_odds(self, view: View, alike: float | None = None) -> float:
+        """Log-odds that a view is of the same person; 0 while the gallery is empty.
 
-    def log_odds(self, view: View) -> float:
-        """Log-odds that a view is of the same person; 0 while the gallery is empty."""
+        Args:
+            view: the view.
+            alike: its likeness to the most alike one of the gallery, where that is known.
+        """
         odds = height_log_odds(view.top, self.top)
         if self.looks is None:
             return odds
-        return odds + look_log_odds(self.alike(view), view.total, len(self.views))
+        if alike is None:
+            alike = float(similarity(view, self.looks).max())
+        return odds + look_log_odds(alike, view.total, len(self.views))
 
     def learn_height(self, top: float) -> None:
         """Take a height of the head above the floor, in metres."""

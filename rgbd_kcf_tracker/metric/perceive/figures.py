@@ -77,24 +77,34 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         scene: of now.
         expected: ``(n, 2)`` metres across and deep, where people are expected.
     """
-    pieces = cut(scene.view.depth, scene.before & scene.standing, JUMP, JUMP_PER_METRE)
+    mask = scene.before & scene.standing
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not len(rows):
+        return []
+    # Mostly few pixels stand before the room: only where they are is anything to be cut.
+    part = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    pieces = cut(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
-    for members in _joined(scene, pieces):
+    for members in _joined(scene, pieces, scene.forward[part]):
         boxes = pieces.boxes[members]
         left, top = int(boxes[:, 0].min()), int(boxes[:, 1].min())
         right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
         crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        parts = _parted(scene, left, top, member[crop], expected)
-        for part_left, part_top, mask in parts:
-            figure = _figure(scene, part_left, part_top, mask, len(parts) > 1)
+        parts = _parted(
+            scene, part[1].start + left, part[0].start + top, member[crop], expected
+        )
+        for part_left, part_top, silhouette in parts:
+            figure = _figure(scene, part_left, part_top, silhouette, len(parts) > 1)
             if figure is not None:
                 found.append(figure)
     return found
 
 
-def _joined(scene: Scene, pieces: Surfaces) -> list[npt.NDArray[np.intp]]:
+def _joined(
+    scene: Scene, pieces: Surfaces, forward: npt.NDArray[np.float32]
+) -> list[npt.NDArray[np.intp]]:
     """Labels of the pieces that make one figure each, the largest first."""
     k = scene.view.intrinsics
     areas = pieces.areas(k)
@@ -102,7 +112,7 @@ def _joined(scene: Scene, pieces: Surfaces) -> list[npt.NDArray[np.intp]]:
     possible[0] = False
     labels = np.flatnonzero(possible)
     labels = labels[np.argsort(-areas[labels], kind='stable')]
-    sums = np.bincount(pieces.labels.ravel(), scene.forward.ravel(), len(pieces))
+    sums = np.bincount(pieces.labels.ravel(), forward.ravel(), len(pieces))
     ahead = sums / np.maximum(pieces.pixels, 1)
     groups: list[list[int]] = []
     extents: list[tuple[float, float, float, float, float, float]] = []

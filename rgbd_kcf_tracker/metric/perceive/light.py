@@ -17,9 +17,9 @@ Image = npt.NDArray[np.uint8]
 
 DARKEST, BRIGHTEST = 12, 243
 """Values between which a channel is neither noise nor saturated."""
-LEAST_PIXELS = 100
-"""Pixels of the room, at every third row and column, from which the light is told."""
-STRIDE = 3
+LEAST_PIXELS = 60
+"""Pixels of the room, at every fifth row and column, from which the light is told."""
+STRIDE = 5
 UNCHANGED = 0.02
 """Gain up to which nothing is done."""
 LARGEST_GAIN = 8.0
