@@ -42,6 +42,8 @@ LEARN_FRACTION = 0.6
 STANDING = 0.7
 """Share of a candidate that always stood there from which it is no target that came from
 elsewhere."""
+SOMEBODY_ELSE = 3.0
+"""Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
 
@@ -164,7 +166,11 @@ class BySurface:
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in found]
-        self.candidates = [c for c in self.candidates if c.evidence.room < STANDING]
+        self.candidates = [
+            c
+            for c in self.candidates
+            if c.evidence.room < STANDING and c.evidence.behind < SOMEBODY_ELSE
+        ]
         self.candidates.sort(key=lambda c: -c.probability)
         for candidate in self.candidates[:2]:
             whole = gathered(scene, self.body, candidate.seen, candidate.placed, others)

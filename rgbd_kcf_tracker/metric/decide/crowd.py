@@ -35,6 +35,8 @@ STEP, STEP_PER_SECOND = 0.3, 1.0
 next."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it."""
+BESIDE = 0.5
+"""Metres between two who are surely two, and not a person and a piece of the same."""
 NEW_SCORE = 0.5
 """Score of somebody who has just come into view."""
 MOST_PEOPLE = 48
@@ -364,11 +366,24 @@ class Crowd:
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
-        seen_now = {people[row].number for row in account.owner if row >= 0}
-        seen_now |= {number for number, seen in targets.items() if seen is not None}
-        for person in people:
-            if person.number in seen_now:
-                person.met |= seen_now - {person.number}
+        self._introduce(account, targets)
+
+    def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+        """Remember who was seen beside whom: they are surely not the same."""
+        seen_now: list[tuple[Person, FloatArray]] = []
+        for column, row in enumerate(account.owner):
+            figure = account.sights[column].figure
+            if row >= 0 and account.people[row].number not in targets:
+                if figure.seen.area > WHOLE and not figure.parted:
+                    seen_now.append((account.people[row], figure.place))
+        for person in account.people:
+            seen = targets.get(person.number)
+            if seen is not None:
+                seen_now.append((person, account.place(seen)))
+        for person, place in seen_now:
+            for other, there in seen_now:
+                if np.hypot(*(place - there)) > BESIDE:
+                    person.met.add(other.number)
 
     def _merge(self, account: Account, row: int, other: int) -> None:
         """Drop the number under which a target was known while it was not recognised."""

@@ -52,12 +52,18 @@ class Evidence:
     rival: float
     room: float
 
+    @property
+    def behind(self) -> float:
+        """By how much somebody else explains the figure better than the target does, log-odds."""
+        return max(0.0, self.rival - max(self.mine, 0.0))
+
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
         near = float(np.exp(-self.gone / FADE))
         away = 1.0 - float(np.exp(-self.gone / AWAY))
-        look, rival = min(max(self.look, -6.0), 5.0), min(self.rival, 8.0)
+        look = min(max(self.look, -6.0), 5.0)
         mine = min(max(self.mine, -6.0), 8.0)
+        behind = min(self.behind, 8.0)
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -77,10 +83,8 @@ class Evidence:
                 away * look,
                 mine,
                 away * mine,
-                rival,
-                away * rival,
-                self.room,
-                away * self.room,
+                behind,
+                away * behind,
                 1.0,
             )
         )
@@ -88,8 +92,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.50, -1.30, -0.17, -1.11, -2.64, 0.16, -4.06, -0.10, 1.46, -0.50, -0.51, 0.98,
-        -0.18, 0.1, 0.2, -0.31, -0.54, -2.32, -2.12, 4.77,
+        -0.62, -2.16, -0.04, -1.70, -2.92, -0.01, -2.20, -1.11, 1.44, -0.68, -2.53, 0.51,
+        0.14, 0.17, 0.46, -0.15, -0.91, 3.80,
     )
 )  # fmt: skip
 

@@ -49,6 +49,9 @@ for one view, and by how much more with each doubling of their number (the best 
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
 SUREST_SAME, SUREST_OTHER = 3.5, -4.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
+ONE_SIDE, ALL_SIDES = 0.4, 4
+"""Share of :data:`SUREST_OTHER` that a single view can say, for there is another side to everybody;
+and the further views from which all sides are known."""
 WHOLE_AREA = 0.3
 """Square metres of a view in which all of somebody shows; less of it tells less."""
 HEIGHT_SIGMA = 0.035
@@ -217,12 +220,14 @@ def look_log_odds(alike: float, area: float, views: int = 1) -> float:
 
     Args:
         alike: see :func:`similarity`.
-        area: square metres of the view that show.
+        area: square metres that show of the view, or of the largest that it was compared with,
+            whichever is less.
         views: how many views of his it was compared with.
     """
     raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * np.log2(views))
     share = 0.4 + 0.6 * min(1.0, area / WHOLE_AREA)
-    return float(min(max(raw, SUREST_OTHER), SUREST_SAME)) * share
+    least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
+    return float(min(max(raw, least), SUREST_SAME)) * share
 
 
 def height_log_odds(top: float | None, known: float | None) -> float:
@@ -278,7 +283,8 @@ class Gallery:
             return odds
         if alike is None:
             alike = float(similarity(view, self.looks).max())
-        return odds + look_log_odds(alike, view.total, len(self.views))
+        area = min(view.total, max(each.total for each in self.views))
+        return odds + look_log_odds(alike, area, len(self.views))
 
     def learn_height(self, top: float) -> None:
         """Take a height of the head above the floor, in metres."""
