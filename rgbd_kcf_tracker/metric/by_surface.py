@@ -39,9 +39,9 @@ GROWN, SHRUNK = 0.3, 0.35
 PLACED_MIDDLE = 0.4
 LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
-STANDING = 0.7
-"""Share of a candidate that always stood there from which it is no target that came from
-elsewhere."""
+STANDING = 0.5
+"""Share of a candidate that is somebody else's, or stood there while the target was elsewhere, from
+which it is not the target."""
 SOMEBODY_ELSE = 3.0
 """Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
 LEAVING = 0.5
@@ -165,7 +165,8 @@ class BySurface:
             for sight in account.sights
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
-        self.candidates = [self._weighed(account, seen, dt, missing) for seen in found]
+        free = [s for s in found if others[s.rows, s.cols][s.mask].mean() < STANDING]
+        self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
         self.candidates = [
             c
             for c in self.candidates
