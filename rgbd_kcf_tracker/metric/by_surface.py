@@ -28,6 +28,8 @@ FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
+OUTSIDE = 0.1
+"""Share of the given box by which a silhouette may stick out of it."""
 FIRST_SIGMA = 0.05
 HIDDEN_NOISE = 0.5
 """Process noise of a hidden target's motion against a visible one's."""
@@ -117,7 +119,7 @@ class BySurface:
         figures = [sight.figure.seen for sight in account.sights]
         overlaps = [BySurface.outline(scene, seen).iou(box) for seen in figures]
         if figures and max(overlaps) >= LOCK_IOU:
-            return figures[int(np.argmax(overlaps))]
+            return BySurface._within(scene, figures[int(np.argmax(overlaps))], box)
         step = scene.view.step
         rows, cols = scene.view.shape
         x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
@@ -134,7 +136,29 @@ class BySurface:
         inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
         iou *= np.bincount(inside.ravel(), minlength=len(scene.surfaces)) > 0
         label = int(np.argmax(iou))
-        return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
+        if iou[label] < LOCK_IOU:
+            return None
+        return BySurface._within(scene, scene.silhouette(label), box)
+
+    @staticmethod
+    def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
+        """The part of a silhouette in the box that was drawn: what sticks out is something else."""
+        step, margin = scene.view.step, OUTSIDE
+        spare_x, spare_y = margin * box.width, margin * box.height
+        x0 = max(seen.left, int((box.x - spare_x) / step))
+        x1 = min(seen.cols.stop, int((box.right + spare_x) / step) + 1)
+        y0 = max(seen.top, int((box.y - spare_y) / step))
+        y1 = min(seen.rows.stop, int((box.bottom + spare_y) / step) + 1)
+        if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
+            return seen
+        part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
+        rows, cols = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
+        if not len(rows):
+            return seen
+        part = part[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        return Silhouette.of(
+            scene.view, x0 + int(cols[0]), y0 + int(rows[0]), part, 0, scene.rim
+        )
 
     # -- one frame --------------------------------------------------------------------------------
 

@@ -30,6 +30,8 @@ WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
+SMALL = 0.1
+"""Square metres of a thing up to which it may be part of somebody's figure."""
 STEP, STEP_PER_SECOND = 0.3, 1.0
 """Metres in depth by which somebody's pixels differ, and may have moved on from one sight to the
 next."""
@@ -154,7 +156,8 @@ class Account:
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``."""
-        index = self.sight_of(seen)
+        # A small thing is no figure, but may be in the hands or at the feet of one.
+        index = self.sight_of(seen) if person.area >= SMALL else -1
         look = None
         stranger = self.stranger(person, index)
         if stranger is not None:
@@ -205,7 +208,8 @@ class Account:
         theirs = np.zeros(len(self.sights) + 1, np.bool_)
         theirs[0] = person.mobile
         for number, owner in enumerate(self.owner, 1):
-            theirs[number] = owner >= 0 and self.people[owner].number in person.met
+            met = owner >= 0 and self.people[owner].number in person.met
+            theirs[number] = met and person.area >= SMALL
         if not theirs.any():
             return np.zeros(self.which.shape, np.bool_)
         mask: npt.NDArray[np.bool_] = theirs[self.which]
@@ -402,7 +406,10 @@ class Crowd:
         if account.time > person.seen_at:
             person.moved_to(place, account.time)
         person.last = seen
-        person.mobile |= account.settled and account.room_share(seen) < PART_OF_ROOM
+        person.area = max(person.area, seen.area)
+        # What is small lies as near to the room as the room's depth is uncertain.
+        if account.settled and seen.area > WHOLE:
+            person.mobile |= account.room_share(seen) < PART_OF_ROOM
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
             others = np.delete(account.odds[:, index], row)

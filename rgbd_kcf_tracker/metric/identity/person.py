@@ -47,6 +47,7 @@ class Person:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
         mobile: whether it was seen before a room that is known, so that what stands still is not it.
+        area: square metres, the most that was seen of it.
         last: the silhouette of the last sight, None where the camera has moved since.
         upright: whether it ever had the shape of a person.
         met: numbers of those who were seen at the same time, and so are surely somebody else.
@@ -62,6 +63,7 @@ class Person:
         self.upright = self.mobile = False
         self.met: set[int] = set()
         self.last: Silhouette | None = None
+        self.area = 0.0
         self._resembles: dict[int, tuple[float, int]] = {}
         self.gallery = Gallery()
 
