@@ -24,6 +24,9 @@ FloatArray = npt.NDArray[np.float64]
 
 NEW = 0.0
 """Log-odds of being somebody known from which a figure is not somebody new."""
+RETURN, RETURN_AFTER = 1.5, 1.5
+"""Log-odds against somebody who has been away for as many seconds coming back just now rather than
+somebody new."""
 SURE = 1.0
 """Log-odds by which an identity must be ahead of all others to be learned from."""
 WHOLE = 0.2
@@ -331,6 +334,8 @@ class Crowd:
                 looks[row, column] = person.gallery.log_odds(sight.view, alike)
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
+            if time - person.seen_at > RETURN_AFTER:
+                odds[row] -= RETURN
         odds += looks
         return odds, looks
 

@@ -54,11 +54,11 @@ ONE_SIDE, ALL_SIDES = 0.4, 4
 and the further views from which all sides are known."""
 WHOLE_AREA = 0.3
 """Square metres of a view in which all of somebody shows; less of it tells less."""
-HEIGHT_SIGMA = 0.035
+HEIGHT_SIGMA = 0.045
 """Metres by which the height of one person's head differs between two sightings."""
 PEOPLE_HEIGHT, PEOPLE_SIGMA = 1.72, 0.11
 """Metres of people's height (adults, both sexes)."""
-STOOPED = 0.15
+STOOPED = 0.25
 """Share of sightings in which somebody does not stand upright."""
 
 _LEVEL = (np.arange(256) * LIGHTNESS // 256).astype(np.int32)
