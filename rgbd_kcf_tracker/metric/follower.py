@@ -191,9 +191,12 @@ class Follower:
     def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
         assert self._look is not None
         look = self._look.step(frame, dt)
-        if look is not None and account is not None and self._stands(account, look.box):
-            self._look.refuse()
-            look = None
+        if look is not None and account is not None:
+            # Depth shows no such thing: a look that has become unlike is something else.
+            unlike = look.ratio < self._parameters.seen_ratio
+            if unlike or self._stands(account, look.box):
+                self._look.refuse()
+                look = None
         if look is not None:
             self._last_box, self._unseen = look.box, 0.0
         else:
@@ -215,7 +218,7 @@ class Follower:
         """Go over to the surface once one has borne out the look, or somebody new is there."""
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
-            if row >= 0 and account.people[row].first_seen < self._since:
+            if row >= 0 and account.people[row].first_seen <= self._since:
                 continue
             outline = BySurface.outline(account.scene, sight.figure.seen)
             common = outline.intersection(self._last_box)
