@@ -158,7 +158,8 @@ class Room:
         left = open_ & (self._front > 0) & (depth > self._front + leap)
         open_ &= ~left
         before |= open_
-        np.copyto(self._front, depth, where=open_)
+        # Who passes before somebody does not take his place.
+        np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
         farther = both & (nearer < -allowed)
         again = farther & (np.abs(depth - self._farther) <= allowed)
         same = both & ~before & ~farther
