@@ -316,13 +316,20 @@ class BySurface:
             ),
             gone=self.hidden_for + dt,
             missing=missing,
-            inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
+            inland=0.0 if self._came_in(account, seen) else self._gone,
             look=claim.look if self._parameters.use_color else 0.0,
             mine=claim.mine if self._parameters.use_others else 0.0,
             rival=claim.rival if self._parameters.use_others else 0.0,
             room=claim.room if self._parameters.use_room else 0.0,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
+
+    def _came_in(self, account: Account, seen: Silhouette) -> bool:
+        """Whether a candidate is at the edge of what the camera sees, or came in there."""
+        if seen.at_edge(account.scene.view, account.scene.rim):
+            return True
+        stranger = account.stranger(self._person, account.sight_of(seen))
+        return stranger is not None and stranger.entered
 
     def _outline(self, view: DepthView) -> tuple[float, float, float, float]:
         """Where the whole body is expected: left, top, right, bottom in pixels of the view."""

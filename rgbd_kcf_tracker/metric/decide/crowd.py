@@ -334,7 +334,7 @@ class Crowd:
                 looks[row, column] = person.gallery.log_odds(sight.view, alike)
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
-            if time - person.seen_at > RETURN_AFTER:
+            if not person.chosen and time - person.seen_at > RETURN_AFTER:
                 odds[row] -= RETURN
         odds += looks
         return odds, looks
@@ -370,7 +370,9 @@ class Crowd:
                 if sight.figure.seen.area < NEW_AREA:
                     continue
                 account.owner[column] = len(people)
-                people.append(self.welcome(sight.figure.place, time))
+                newcomer = self.welcome(sight.figure.place, time)
+                newcomer.entered = sight.figure.seen.at_edge(account.scene.view, account.scene.rim)
+                people.append(newcomer)
                 self._see(account, len(people) - 1, sight.figure.seen, column)
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:

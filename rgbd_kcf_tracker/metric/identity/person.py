@@ -48,6 +48,7 @@ class Person:
         sightings: how often it was seen.
         mobile: whether it was seen before a room that is known, so that what stands still is not it.
         area: square metres, the most that was seen of it.
+        entered: whether it was first seen at the edge of what the camera sees.
         last: the silhouette of the last sight, None where the camera has moved since.
         upright: whether it ever had the shape of a person.
         met: numbers of those who were seen at the same time, and so are surely somebody else.
@@ -60,7 +61,7 @@ class Person:
         self.first_place, self.travelled = place.copy(), 0.0
         self.seen_at = self.first_seen = time
         self.sightings = 1
-        self.upright = self.mobile = False
+        self.upright = self.mobile = self.entered = False
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
