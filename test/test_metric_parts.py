@@ -136,7 +136,7 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     color = np.zeros((80, 40, 3), np.uint8)
     color[:40] = (200, 30, 30)
     color[40:] = (30, 30, 200)
-    codes = color_codes(view_lab(color, 1, (80, 40)))
+    codes = color_codes(view_lab(color))
     mask = np.ones((80, 40), bool)
     counts = band_histograms(codes, mask, 0, 80)
     assert counts.shape == (BANDS, CODES)
