@@ -338,7 +338,7 @@ def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
             Someone(-0.9 + 0.05 * i, 3.0, RED), Someone(0.9 - 0.03 * i, 3.0, BLUE)
         )
     columns = sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
-    one, two = (who(account, c) for c in columns)
+    one = who(account, columns[0])
     others = account.others(one)
     mine, theirs = (account.sights[c].figure.seen for c in columns)
     assert others[theirs.rows, theirs.cols][theirs.mask].all()
