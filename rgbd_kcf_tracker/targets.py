@@ -131,6 +131,3 @@ class TargetSet:
     def __len__(self) -> int:
         """Targets that were chosen and not removed."""
         return len(self._together if self._together is not None else self._trackers)
-
-
-

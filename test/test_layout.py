@@ -28,6 +28,7 @@ LAYERS = (
     ('features',),
     ('metric', 'thesis'),
     ('variants',),
+    ('targets',),
     ('recordings', 'simulation', 'cameras'),
     ('live', 'evaluation'),
     ('ros', 'cli', 'view', 'bench'),
@@ -50,7 +51,7 @@ ROS_MODULES = {
 }  # fmt: skip
 LEAN = {
     'errors', 'parameters', 'geometry', 'frame', 'track',
-    'features', 'metric', 'thesis', 'variants',
+    'features', 'metric', 'thesis', 'variants', 'targets',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.
 WITH_ROS = {'ros', 'bench'}

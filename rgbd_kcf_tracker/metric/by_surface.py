@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box, Pose
-from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
+from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
@@ -167,7 +167,8 @@ class BySurface:
 
         Returns:
             What is most likely the target, or None where nothing is. What follows from it is only
-            taken in by :meth:`take` or :meth:`miss`, one of which must be called.
+            taken in by :meth:`take`, :meth:`seen_elsewhere` or :meth:`miss`, one of which must be
+            called.
         """
         scene = account.scene
         following = self.hidden_for == 0.0

@@ -72,6 +72,7 @@ class Follower:
         self._hidden_for = 0.0
         self._agreed = 0
         self._last_box, self._unseen = box, 0.0
+        self._size_of_image = frame.width, frame.height
         self._mobile = False
         self._since = crowd.time
         self.person: Person | None = None
@@ -190,6 +191,7 @@ class Follower:
 
     def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
         assert self._look is not None
+        self._follow_size(frame)
         look = self._look.step(frame, dt)
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
@@ -209,6 +211,14 @@ class Follower:
         if look is None:
             return self._hidden(dt)
         return self._tracked(frame, look.box, _score(look), look.depth)
+
+    def _follow_size(self, frame: Frame) -> None:
+        """Carry the last box over to a stream whose image size has changed."""
+        width, height = self._size_of_image
+        if (frame.width, frame.height) != (width, height):
+            across, down, b = frame.width / width, frame.height / height, self._last_box
+            self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
+            self._size_of_image = frame.width, frame.height
 
     def _stands(self, account: Account, box: Box) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""

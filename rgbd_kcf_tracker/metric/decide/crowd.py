@@ -384,9 +384,10 @@ class Crowd:
         seen_now: list[tuple[Person, FloatArray]] = []
         for column, row in enumerate(account.owner):
             figure = account.sights[column].figure
-            if row >= 0 and account.people[row].number not in targets:
-                if figure.seen.area > WHOLE and not figure.parted:
-                    seen_now.append((account.people[row], figure.place))
+            if row < 0 or account.people[row].number in targets:
+                continue
+            if figure.seen.area > WHOLE and not figure.parted:
+                seen_now.append((account.people[row], figure.place))
         for person in account.people:
             seen = targets.get(person.number)
             if seen is not None:

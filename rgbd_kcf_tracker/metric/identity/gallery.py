@@ -212,7 +212,8 @@ def similarity(view: View, looks: Looks) -> FloatArray:
     cells = cross.reshape(SLICES, len(looks), LIGHTNESS * LIGHTNESS)[:, :, _CELLS]
     alike = np.add.reduceat(cells, _STARTS, axis=2)
     mean = np.einsum('ns,snd->nd', weight, alike) - _COST
-    return np.maximum(mean.max(axis=1), 0)
+    best: FloatArray = np.maximum(mean.max(axis=1), 0)
+    return best
 
 
 def look_log_odds(alike: float, area: float, views: int = 1) -> float:

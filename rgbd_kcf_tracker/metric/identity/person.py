@@ -46,7 +46,7 @@ class Person:
     Attributes:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
-        mobile: whether it was seen before a room that is known, so that what stands still is not it.
+        mobile: whether it was seen before a room that is known: what stands still is not it.
         area: square metres, the most that was seen of it.
         entered: whether it was first seen at the edge of what the camera sees.
         last: the silhouette of the last sight, None where the camera has moved since.

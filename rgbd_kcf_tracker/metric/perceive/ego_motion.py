@@ -103,9 +103,7 @@ def _told(
         return None
     k = last_view.intrinsics
     z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
-    points = np.stack(
-        ((first[:, 0] - k.cx) * z / k.fx, (first[:, 1] - k.cy) * z / k.fy, z), axis=1
-    )
+    points = np.stack(((first[:, 0] - k.cx) * z / k.fx, (first[:, 1] - k.cy) * z / k.fy, z), axis=1)
     motion = _fitted(points, second, k)
     moved = motion.of(points)
     ahead = np.maximum(moved[:, 2], 0.05)

@@ -92,9 +92,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        parts = _parted(
-            scene, part[1].start + left, part[0].start + top, member[crop], expected
-        )
+        parts = _parted(scene, part[1].start + left, part[0].start + top, member[crop], expected)
         for part_left, part_top, silhouette in parts:
             figure = _figure(scene, part_left, part_top, silhouette, len(parts) > 1)
             if figure is not None:
@@ -222,7 +220,7 @@ def _heads(
     fy: float,
 ) -> FloatArray:
     """Where the heads in a wide mask are, ``(n, 2)`` metres across and deep."""
-    has = mask.any(axis=0)
+    has = np.asarray(mask.any(axis=0))
     first = mask.argmax(axis=0)
     sums = np.where(mask, depth, 0).sum(axis=0)
     z = np.where(has, sums / np.maximum(mask.sum(axis=0), 1), np.nan)

@@ -136,7 +136,8 @@ class Room:
         self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._farther = np.zeros_like(self.depth)
         self._still_for = np.zeros_like(self.depth)
-        return unknown & ~opened
+        lost: Mask = unknown & ~opened
+        return lost
 
     def update(self, depth: DepthArray, dt: float, somebody: Mask | None) -> None:
         """Compare the next view with the room and learn from it.

@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
 from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
     """One frame's depth, surfaces and colours at the resolution of the view.
@@ -140,7 +141,9 @@ class SceneReader:
         before = self.room.before
         lab = view_lab(self._light.steadied(image, ~before))
         codes = color_codes(lab)
-        return Scene(view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab, motion)
+        return Scene(
+            view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab, motion
+        )
 
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
