@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Follow one target live in colour and depth, and say truthfully when it is hidden."""
+"""Follow people and things in colour and depth, and say truthfully when they are hidden."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
     from rgbd_kcf_tracker.errors import RgbdKcfError
     from rgbd_kcf_tracker.frame import Frame
-    from rgbd_kcf_tracker.geometry import Box, Intrinsics
+    from rgbd_kcf_tracker.geometry import Box, Intrinsics, Pose
+    from rgbd_kcf_tracker.targets import TargetSet
     from rgbd_kcf_tracker.track import Track, Tracker, TrackState
     from rgbd_kcf_tracker.variants import create_tracker
 
@@ -20,7 +21,9 @@ __all__ = [
     'Box',
     'Frame',
     'Intrinsics',
+    'Pose',
     'RgbdKcfError',
+    'TargetSet',
     'Track',
     'TrackState',
     'Tracker',
@@ -31,7 +34,9 @@ _HOMES = {
     'Box': 'geometry',
     'Frame': 'frame',
     'Intrinsics': 'geometry',
+    'Pose': 'geometry',
     'RgbdKcfError': 'errors',
+    'TargetSet': 'targets',
     'Track': 'track',
     'TrackState': 'track',
     'Tracker': 'track',

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ImageError
-from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.geometry import Intrinsics, Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,6 +24,8 @@ class Frame:
             there is no reading; None where the camera gave no depth for this moment.
         stamp_ns: time of exposure in nanoseconds.
         intrinsics: of the colour image, or None where unknown.
+        pose: of the camera's optical frame in a fixed frame, or None where unknown.
+        camera: its name, where there are several.
 
     Raises:
         ImageError: where a shape or type is not as above.
@@ -33,6 +35,8 @@ class Frame:
     depth: npt.NDArray[np.float32] | None = None
     stamp_ns: int = 0
     intrinsics: Intrinsics | None = None
+    pose: Pose | None = None
+    camera: str = ''
 
     def __post_init__(self) -> None:
         color = self.color

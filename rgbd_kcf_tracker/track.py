@@ -38,6 +38,12 @@ class Track:
         depth: distance of the target along the optical axis in metres; None where unknown.
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
             forward, x right, y down); None where depth or intrinsics are unknown.
+        id: of the target among several; 0 where there is only one.
+        velocity: ``(x, y, z)`` in metres per second in the same frame; None where unknown.
+        covariance: of the position or the predicted position, ``(3, 3)`` row by row in square
+            metres; None where unknown.
+        predicted: where a target that is not seen is believed to be, ``(x, y, z)`` in metres; None
+            while it is seen, and where nothing is known.
     """
 
     box: Box | None
@@ -45,6 +51,10 @@ class Track:
     score: float = 0.0
     depth: float | None = None
     position: tuple[float, float, float] | None = None
+    id: int = 0
+    velocity: tuple[float, float, float] | None = None
+    covariance: tuple[float, ...] | None = None
+    predicted: tuple[float, float, float] | None = None
 
     @property
     def occluded(self) -> bool:

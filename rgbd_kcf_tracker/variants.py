@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.tracker import MetricTracker
+from rgbd_kcf_tracker.metric.targets import MetricTracker
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.thesis.kcf import KcfParameters, KcfTracker
 from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters, RgbdTracker

@@ -31,6 +31,7 @@ LAYERS = (
     ('features',),
     ('metric', 'thesis'),
     ('variants',),
+    ('targets',),
     ('recordings', 'simulation', 'cameras', 'batch'),
     ('live', 'evaluation'),
     ('ros', 'cli', 'view', 'bench'),
@@ -56,7 +57,7 @@ ROS_MODULES = {
 }  # fmt: skip
 LEAN = {
     'errors', 'parameters', 'geometry', 'frame', 'track',
-    'features', 'metric', 'thesis', 'variants',
+    'features', 'metric', 'thesis', 'variants', 'targets',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.
 WITH_ROS = {'ros', 'bench'}

@@ -155,18 +155,6 @@ def test_never_raises_on_odd_depth():
             assert 0 <= track.score <= 1
 
 
-def test_goes_on_when_the_image_size_changes():
-    tracker = create_tracker('metric')
-    tracker.start(picture(), Box(120, 60, 60, 140))
-    for i, size in enumerate([(240, 320), (480, 640), (120, 160), (240, 320)], start=1):
-        tracker.update(picture(i, size) if size[0] >= 240 else _small(i))
-
-
-def _small(index: int) -> Frame:
-    color = np.zeros((120, 160, 3), np.uint8)
-    return Frame(color, np.full((120, 160), 2.0, np.float32), index * 33_000_000, None)
-
-
 def test_stamps_may_stand_still_or_jump_back():
     tracker = create_tracker('metric')
     frame = picture()

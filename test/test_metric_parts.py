@@ -11,10 +11,9 @@ import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Box, Frame, Intrinsics
+from rgbd_kcf_tracker import Frame, Intrinsics
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
-from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
@@ -137,7 +136,7 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     color = np.zeros((80, 40, 3), np.uint8)
     color[:40] = (200, 30, 30)
     color[40:] = (30, 30, 200)
-    codes = color_codes(view_lab(color, 1, (80, 40)))
+    codes = color_codes(view_lab(color))
     mask = np.ones((80, 40), bool)
     counts = band_histograms(codes, mask, 0, 80)
     assert counts.shape == (BANDS, CODES)
@@ -156,12 +155,12 @@ def test_colours_compare_before_and_after_a_change_of_light():
     depth = wall()
     dark = cv2.GaussianBlur(rng.integers(0, 140, (160, 240, 3), dtype=np.uint8), (0, 0), 5)
     reader = SceneReader(240, 0.04, 0.03, 0.0, 0)
-    before = reader.read(Frame(dark, depth, 0, CAMERA)).codes
+    before = reader.read(Frame(dark, depth, 0, CAMERA), 0.0).codes
     # Every pixel 1.5 times as bright, from one frame to the next.
     light = np.clip(dark * 1.5, 0, 255).astype(np.uint8)
-    after = reader.read(Frame(light, depth, 1, CAMERA)).codes
+    after = reader.read(Frame(light, depth, 1, CAMERA), 0.033).codes
     assert np.mean(after >> 6 == before >> 6) > 0.8
-    still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA)).codes
+    still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA), 0.0).codes
     assert np.mean(still >> 6 == before >> 6) < 0.5
 
 
@@ -266,35 +265,6 @@ def test_body_does_not_grow_into_its_neighbour():
     assert body.area < 2 * first.area
 
 
-def lookalikes(left: int, right: int) -> Frame:
-    depth = np.full((270, 480), 4.0, np.float32)
-    color = np.full((270, 480, 3), 90, np.uint8)
-    for x in (left, right):
-        depth[80:250, x : x + 60] = 2.0
-        color[80:250, x : x + 60] = (40, 40, 180)
-    return Frame(color, depth, 0, Intrinsics(270, 270, 240, 135))
-
-
-def test_a_lookalike_seen_beside_the_target_stays_known():
-    reader = SceneReader(240, 0.04, 0.03, 0.0, 0)
-    bystanders = Bystanders()
-    scene = reader.read(lookalikes(100, 300))
-    bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
-    target = scene.silhouette(int(scene.surfaces.labels[80, 65]))
-    other = scene.silhouette(int(scene.surfaces.labels[80, 165]))
-    none = np.zeros(len(scene.surfaces), bool)
-    around = (target.rows, target.cols)
-    bystanders.remember(scene.view, scene.surfaces, target, around, none, 0.01)
-    # At 30 Hz the pixels tell, at 5 Hz the things do.
-    for step, dt in ((4, 1 / 30), (40, 0.2)):
-        scene = reader.read(lookalikes(100, 300 + step))
-        bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
-        target = scene.silhouette(int(scene.surfaces.labels[80, 65]))
-        other = scene.silhouette(int(scene.surfaces.labels[80, (310 + step) // 2]))
-        assert max(bystanders.of(other, scene.surfaces)) > 0.5
-        assert bystanders.of(target, scene.surfaces)[0] < 0.1
-
-
 # -- the look -------------------------------------------------------------------------------------
 
 
@@ -337,14 +307,15 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
 GOOD = Evidence(
     step=0.5,
     stride=0.1,
-    pale=0.0,
-    known=0.0,
-    kin=0.0,
     fraction=1.0,
     height=0.0,
-    hidden=0.0,
+    gone=0.1,
     missing=False,
     inland=0.0,
+    look=3.0,
+    mine=5.0,
+    rival=0.0,
+    room=0.0,
 )
 
 
@@ -352,21 +323,17 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
     assert len(GOOD.features()) == len(WEIGHTS)
     assert probability(GOOD) > 0.95
     for worse in (
-        {'step': 40.0, 'stride': 6.0},
-        {'pale': 0.5, 'step': 12.0, 'stride': 2.0},
-        {'pale': 0.95},
-        {'known': 1.0, 'kin': 1.0, 'hidden': 0.5, 'step': 4.0, 'stride': 0.5},
-        {'fraction': 0.08},
-        {'height': -8.0, 'pale': 0.3},
+        {'step': 60.0, 'stride': 12.0},
+        {'look': -4.0, 'mine': -4.0, 'gone': 3.0},
+        {'look': -4.0, 'mine': -4.0, 'rival': 6.0},
+        {'fraction': 0.05, 'look': 0.0, 'mine': 0.0},
+        {'gone': 4.0, 'look': -2.0, 'mine': -2.0, 'rival': 4.0},
     ):
         assert probability(dataclasses.replace(GOOD, **worse)) < 0.5, worse
 
 
-def test_surface_of_a_box_is_the_one_it_is_drawn_about():
-    from rgbd_kcf_tracker.metric.by_surface import BySurface
-
-    scene = SceneReader(240, 0.04, 0.03, 0.0, 0).read(lookalikes(100, 300))
-    seen = BySurface.surface_of(scene, Box(100, 80, 60, 170))
-    assert seen is not None
-    assert BySurface.outline(scene, seen).iou(Box(100, 80, 60, 170)) > 0.9
-    assert BySurface.surface_of(scene, Box(10, 10, 20, 20)) is None
+def test_a_rival_counts_only_as_far_as_he_explains_better():
+    assert GOOD.behind == 0
+    assert dataclasses.replace(GOOD, rival=4.0).behind == 0
+    assert dataclasses.replace(GOOD, rival=8.0).behind == pytest.approx(3.0)
+    assert dataclasses.replace(GOOD, mine=-2.0, rival=1.0).behind == pytest.approx(1.0)

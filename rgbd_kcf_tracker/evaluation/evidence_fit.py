@@ -12,6 +12,7 @@ calibrated. What is printed goes into ``metric/decide/evidence.py``.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import itertools
 import sys
 from dataclasses import dataclass
@@ -26,9 +27,9 @@ from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import at_rate, with_intrinsics
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.metric.decide.evidence import OTHER_COLORS, WEIGHTS
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.tracker import MetricTracker
+from rgbd_kcf_tracker.metric.targets import MetricTracker
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,30 +40,40 @@ ASTRAY, BACK = 2, 8
 REAL_WEIGHT, SPARSE_WEIGHT = 4.0, 2.0
 """Weight of candidates from recordings, and of those at less than 20 Hz, against 30 Hz scenes."""
 SPARSE_HZ = 20.0
-PALE_WEIGHT = 0.01
-PALE_RANGE = (0.6, 0.95)
-"""Weight and loss of likeness of the target's places with a thing of wholly other colours there."""
-PALE, FAR = 3, 4
-"""Columns of :meth:`Evidence.features` that depend on colour."""
+OTHER_WEIGHT, OTHER_LOOK = 0.01, -4.2
+"""Weight of the target's places with a thing of wholly other look there, and the log-odds of that
+look: the least that a gallery says, a strange height included."""
 RIDGE = 2e-5
 FOLDS = 4
-SEED = 0
 EDGES = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Examples:
-    """Candidates: features ``(n, k)``; label 1 or 0, weight and scenario ``(n,)`` each."""
+    """Candidates: evidence, label 1 or 0, weight and scenario, ``(n,)`` each."""
 
-    features: FloatArray
+    evidence: npt.NDArray[np.object_]
     labels: npt.NDArray[np.int64]
     weights: FloatArray
     groups: npt.NDArray[np.str_]
 
+    @property
+    def features(self) -> FloatArray:
+        """The regression's inputs, ``(n, len(WEIGHTS))``."""
+        rows = [evidence.features() for evidence in self.evidence]
+        return np.array(rows, np.float64).reshape(len(rows), len(WEIGHTS))
+
+    def where(self, chosen: npt.NDArray[np.bool_]) -> Examples:
+        """Those of them that are ``chosen``, ``(n,)`` bool."""
+        return Examples(
+            self.evidence[chosen], self.labels[chosen], self.weights[chosen], self.groups[chosen]
+        )
+
 
 def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> Examples:
     """Run the tracker over a sequence and label every candidate that it weighs."""
-    features, labels = [], []
+    evidence: list[Evidence] = []
+    labels: list[int] = []
     tracker: MetricTracker | None = None
     astray = back = 0
     samples = sequence.open().samples
@@ -84,7 +95,7 @@ def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> E
             for candidate, box in tracker.weighed():
                 overlap = max((box.iou(t) for t in truths), default=0.0)
                 if not WRONG <= overlap <= RIGHT:
-                    features.append(candidate.evidence.features())
+                    evidence.append(candidate.evidence)
                     labels.append(int(overlap > RIGHT))
         if track.box is None:
             continue
@@ -100,7 +111,7 @@ def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> E
         weight = SPARSE_WEIGHT
     count = len(labels)
     return Examples(
-        np.array(features).reshape(count, len(WEIGHTS)),
+        np.array(evidence, np.object_),
         np.array(labels, np.int64),
         np.full(count, weight),
         np.full(count, sequence.scenario),
@@ -114,7 +125,7 @@ def joined(parts: list[Examples]) -> Examples:
         DatasetError: where there are no targets or nothing else among them.
     """
     whole = Examples(
-        np.concatenate([p.features for p in parts]),
+        np.concatenate([p.evidence for p in parts]),
         np.concatenate([p.labels for p in parts]),
         np.concatenate([p.weights for p in parts]),
         np.concatenate([p.groups for p in parts]),
@@ -124,30 +135,36 @@ def joined(parts: list[Examples]) -> Examples:
     return whole
 
 
-def with_other_colors(examples: Examples) -> Examples:
-    """The examples and, for each target, a thing of wholly other colours at its place.
+def with_other_looks(examples: Examples) -> Examples:
+    """The examples and, for each target, a thing of wholly other look at its place.
 
     It is hardly ever met, since mostly depth tells the two apart; but it must not pass.
     """
-    rng = np.random.default_rng(SEED)
-    good = (examples.labels == 1) & (examples.features[:, PALE] < 0.1)
-    features = examples.features[good].copy()
-    pale = rng.uniform(*PALE_RANGE, len(features))
-    features[:, PALE] = pale
-    features[:, FAR] = np.maximum(0.0, pale - OTHER_COLORS)
-    count = len(features)
-    return Examples(
-        np.concatenate((examples.features, features)),
-        np.concatenate((examples.labels, np.zeros(count, np.int64))),
-        np.concatenate((examples.weights, np.full(count, PALE_WEIGHT))),
-        np.concatenate((examples.groups, examples.groups[good])),
+    alike = np.array([evidence.look > 0 for evidence in examples.evidence], np.bool_)
+    good = examples.where((examples.labels == 1) & alike)
+    other = np.array([_of_other_look(evidence) for evidence in good.evidence], np.object_)
+    count = len(other)
+    return joined(
+        [
+            examples,
+            Examples(other, np.zeros(count, np.int64), np.full(count, OTHER_WEIGHT), good.groups),
+        ]
     )
+
+
+def _of_other_look(evidence: Evidence) -> Evidence:
+    """The same place with another look; what is said of its figure holds the look too."""
+    mine = evidence.mine
+    if mine != 0:
+        mine -= evidence.look - OTHER_LOOK
+    return dataclasses.replace(evidence, look=OTHER_LOOK, mine=mine)
 
 
 def fit(examples: Examples) -> FloatArray:
     """Weights of a logistic regression with a slight ridge, ``(k,)``."""
-    scale = np.abs(examples.features).max(axis=0) + 1e-9
-    inputs = examples.features / scale
+    features = examples.features
+    scale = np.abs(features).max(axis=0) + 1e-9
+    inputs = features / scale
     sign = np.where(examples.labels == 1, 1.0, -1.0)
     share = examples.weights / examples.weights.sum()
 
@@ -180,14 +197,8 @@ def left_out(examples: Examples) -> list[float]:
         test = np.isin(examples.groups, names[first::FOLDS])
         if test.all():
             continue
-        rest = Examples(
-            examples.features[~test],
-            examples.labels[~test],
-            examples.weights[~test],
-            examples.groups[~test],
-        )
-        weights = fit(with_other_colors(rest))
-        decided = probabilities(examples.features[test], weights) > 0.5
+        weights = fit(with_other_looks(examples.where(~test)))
+        decided = probabilities(examples.where(test).features, weights) > 0.5
         shares.append(float(np.mean(decided == (examples.labels[test] == 1))))
     return shares
 
@@ -218,14 +229,15 @@ def main() -> int:
     except RgbdKcfError as error:
         print(f'evidence_fit: error: {error}', file=sys.stderr)
         return 2
-    weights = fit(with_other_colors(examples))
+    features = examples.features
+    weights = fit(with_other_looks(examples))
     print('weights:', ', '.join(f'{w:.3f}' for w in weights))
     for label, values in (('released', WEIGHTS), ('fitted', weights)):
-        chance = probabilities(examples.features, values)
+        chance = probabilities(features, values)
         share = np.mean((chance > 0.5) == (examples.labels == 1))
         print(f'{label}: {100 * share:.1f} % of {len(chance)} candidates decided rightly')
     print('scenarios left out:', ', '.join(f'{100 * s:.1f} %' for s in left_out(examples)))
-    chance = probabilities(examples.features, weights)
+    chance = probabilities(features, weights)
     for low, high in itertools.pairwise(EDGES):
         inside = (chance >= low) & (chance < high)
         if inside.any():

@@ -78,12 +78,14 @@ class ByLook:
         self._scales = ScaleFilter(box.width, box.height)
         self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
         self._first_depth = self._depth = depth_in(frame, box)
+        self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unlearned = 0.0
 
     def step(self, frame: Frame, dt: float) -> Look | None:
         """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
         parameters = self._parameters
+        self._follow_size(frame)
         if self._hidden:
             sighting = self._searched(frame, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
@@ -98,6 +100,7 @@ class ByLook:
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
+        self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
         if sighting.ratio < self._parameters.seen_ratio:
@@ -109,12 +112,29 @@ class ByLook:
         self._unlearned += dt
         if self._unlearned < interval:
             return
+        self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
         self._appearance.remember_peak(sighting.peak, self._unlearned)
         self._appearance.learn(frame.color, self._cx, self._cy, self._scale, self._unlearned)
         self._depth = depth_in(frame, box) or self._depth
         self._unlearned = 0.0
+
+    def refuse(self) -> None:
+        """Take back what :meth:`step` found: the target is hidden."""
+        self._hidden = True
+
+    def _follow_size(self, frame: Frame) -> None:
+        """Carry the target over to a stream whose image size has changed."""
+        size = frame.width, frame.height
+        if size == self._size_of_image:
+            return
+        across, down = size[0] / self._size_of_image[0], size[1] / self._size_of_image[1]
+        self._size_of_image = size
+        self._cx, self._cy = self._cx * across, self._cy * down
+        zoom = float(np.sqrt(across * down))
+        self._zoom *= zoom
+        self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
 
     def _place(self, box: Box) -> None:
         self._hidden = False
@@ -183,7 +203,7 @@ class ByLook:
         if self._first_depth and self._depth and depth and 0.5 < depth / self._depth < 2:
             if abs(depth / self._depth - 1) < SAME_DEPTH or sighting.ratio > UNSURE:
                 self._depth = depth
-            wanted = np.log(self._first_depth / self._depth / self._scale)
+            wanted = np.log(self._first_depth / self._depth * self._zoom / self._scale)
             self._scale *= float(np.exp(np.clip(wanted, -0.3, 0.3) * min(1, dt / SCALE_TIME)))
         else:
             self._scale *= self._scales.factor(frame.color, self._cx, self._cy, *self._size)

@@ -10,14 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Pose
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
-from rgbd_kcf_tracker.metric.decide.proposals import Expectation, gathered, propose
+from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
-from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -27,6 +28,8 @@ FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
+OUTSIDE = 0.1
+"""Share of the given box by which a silhouette may stick out of it."""
 FIRST_SIGMA = 0.05
 HIDDEN_NOISE = 0.5
 """Process noise of a hidden target's motion against a visible one's."""
@@ -38,6 +41,11 @@ GROWN, SHRUNK = 0.3, 0.35
 PLACED_MIDDLE = 0.4
 LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
+STANDING = 0.5
+"""Share of a candidate that is somebody else's, or stood there while the target was elsewhere, from
+which it is not the target."""
+SOMEBODY_ELSE = 3.0
+"""Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
 
@@ -52,12 +60,28 @@ class Candidate:
     probability: float
 
 
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """Where a target is believed to be, in the camera's optical frame.
+
+    Attributes:
+        position: metres, the middle of the body.
+        velocity: metres per second.
+        covariance: of the position, ``(3, 3)`` row by row in square metres.
+    """
+
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+    covariance: tuple[float, ...]
+
+
 class BySurface:
     """Follows one target from scene to scene.
 
     Args:
-        scene: the first.
+        account: of the first frame.
         first: the target's silhouette in it.
+        person: the target as one of the crowd.
         parameters: of the tracker.
 
     Attributes:
@@ -65,11 +89,13 @@ class BySurface:
         hidden_for: seconds since the target was last seen.
     """
 
-    def __init__(self, scene: Scene, first: Silhouette, parameters: MetricParameters) -> None:
+    def __init__(
+        self, account: Account, first: Silhouette, person: Person, parameters: MetricParameters
+    ) -> None:
         self._parameters = parameters
+        self._person = person
+        scene = account.scene
         self.body = Body(first)
-        self._bystanders = Bystanders()
-        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, 0.0)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
         placed = self.body.place(first, scene.codes, scene.view, here, None)
@@ -83,13 +109,17 @@ class BySurface:
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
         self.candidates: list[Candidate] = []
-        self.body.learn_colors(placed, None)
-        self._remember(scene, first)
-        self._learn_around(scene, None)
+        self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
+        self._learn_around(scene, first, None)
 
     @staticmethod
-    def surface_of(scene: Scene, box: Box) -> Silhouette | None:
-        """The surface that a box of the image is drawn about, or None where no one fits."""
+    def surface_of(account: Account, box: Box) -> Silhouette | None:
+        """The figure or surface that a box of the image is drawn about, None where none fits."""
+        scene = account.scene
+        figures = [sight.figure.seen for sight in account.sights]
+        overlaps = [BySurface.outline(scene, seen).iou(box) for seen in figures]
+        if figures and max(overlaps) >= LOCK_IOU:
+            return BySurface._within(scene, figures[int(np.argmax(overlaps))], box)
         step = scene.view.step
         rows, cols = scene.view.shape
         x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
@@ -106,36 +136,73 @@ class BySurface:
         inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
         iou *= np.bincount(inside.ravel(), minlength=len(scene.surfaces)) > 0
         label = int(np.argmax(iou))
-        return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
+        if iou[label] < LOCK_IOU:
+            return None
+        return BySurface._within(scene, scene.silhouette(label), box)
+
+    @staticmethod
+    def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
+        """The part of a silhouette in the box that was drawn: what sticks out is something else."""
+        step, margin = scene.view.step, OUTSIDE
+        spare_x, spare_y = margin * box.width, margin * box.height
+        x0 = max(seen.left, int((box.x - spare_x) / step))
+        x1 = min(seen.cols.stop, int((box.right + spare_x) / step) + 1)
+        y0 = max(seen.top, int((box.y - spare_y) / step))
+        y1 = min(seen.rows.stop, int((box.bottom + spare_y) / step) + 1)
+        if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
+            return seen
+        part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
+        rows, cols = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
+        if not len(rows):
+            return seen
+        part = part[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        return Silhouette.of(
+            scene.view, x0 + int(cols[0]), y0 + int(rows[0]), part, 0, scene.rim
+        )
 
     # -- one frame --------------------------------------------------------------------------------
 
-    def step(self, scene: Scene, dt: float) -> Candidate | None:
-        """Look for the target in the next scene, ``dt`` seconds later.
+    def step(self, account: Account, dt: float) -> Candidate | None:
+        """Look for the target in the next frame, ``dt`` seconds later.
 
         Returns:
             What is most likely the target, or None where nothing is. What follows from it is only
-            taken in by :meth:`take` or :meth:`miss`, one of which must be called.
+            taken in by :meth:`take`, :meth:`seen_elsewhere` or :meth:`miss`, one of which must be
+            called.
         """
+        scene = account.scene
         following = self.hidden_for == 0.0
+        if isinstance(scene.motion, Pose):
+            self.motion.carried(scene.motion)
+            if self._cloud is not None:
+                self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
-        self._bystanders.compare(scene.view, scene.surfaces, scene.lab, dt)
         if following:
             self._cloud = None
         elif self._parameters.use_particles:
             self._step_cloud(scene, dt)
         expected = self._expected(dt)
         missing = self._should_be_seen(scene) > 0.6
-        found = propose(
-            scene, self.body, expected, self._bystanders, self._parameters.most_candidates
-        )
-        self.candidates = [self._weighed(scene, seen, dt, missing) for seen in found]
+        others = account.others(self._person)
+        found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
+        found += [
+            sight.figure.seen
+            for sight in account.sights
+            if sight.figure.seen.area < MOST_SHARE * self.body.area
+        ]
+        free = [s for s in found if others[s.rows, s.cols][s.mask].mean() < STANDING]
+        self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
+        self.candidates = [
+            c
+            for c in self.candidates
+            if c.evidence.room < STANDING and c.evidence.behind < SOMEBODY_ELSE
+        ]
         self.candidates.sort(key=lambda c: -c.probability)
         for candidate in self.candidates[:2]:
-            whole = gathered(scene, self.body, candidate.seen, candidate.placed, self._bystanders)
+            whole = gathered(scene, self.body, candidate.seen, candidate.placed, others)
             if whole is None:
                 continue
-            more = self._weighed(scene, whole, dt, missing)
+            more = self._weighed(account, whole, dt, missing)
             if _logit(more.probability) > _logit(candidate.probability) - 1.0:
                 self.candidates.append(more)
                 if candidate is self.candidates[0]:
@@ -143,9 +210,31 @@ class BySurface:
                     break
         best = self.candidates[0] if self.candidates else None
         parameters = self._parameters
-        if best is None or best.probability < parameters.acceptance:
+        if best is None or best.probability < (
+            parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
+        ):
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
+
+    def belief(self) -> Belief:
+        """Where the target is believed to be now: by the particles while it is hidden."""
+        place, sigma = self.motion.position, self.motion.sigma
+        if self._cloud is not None:
+            place, sigma = self._cloud.mean, self._cloud.spread
+        middle = place + np.array([0.0, self.body.height / 2, 0.0])
+        x, y, z = (float(v) for v in middle)
+        u, v, w = (float(speed) for speed in self.motion.velocity)
+        covariance = np.diag(np.square(sigma)).ravel()
+        return Belief((x, y, z), (u, v, w), tuple(float(c) for c in covariance))
+
+    def resume(self, found: Candidate) -> None:
+        """Forget where the target went: it has come back elsewhere."""
+        self.motion = MotionFilter(
+            found.placed.position,
+            FIRST_SIGMA,
+            self._parameters.speed,
+            np.full(3, self._parameters.acceleration),
+        )
 
     def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
@@ -156,11 +245,11 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
-        self._remember(scene, seen)
         self.body.grow(seen)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
-            self.body.learn_colors(placed, dt)
-            self._learn_around(scene, dt)
+            top = float(placed.position[1])
+            self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
+            self._learn_around(scene, seen, dt)
             self.body.learn_size(seen, dt)
         return self.box(scene, found)
 
@@ -170,8 +259,6 @@ class BySurface:
             self._gone = max(self._gone, self._outside(scene))
         self.hidden_for += dt
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
-        if scene is not None:
-            self._remember(scene, None)
 
     def seen_elsewhere(self, view: DepthView, box: Box) -> None:
         """Take a box of the image that was found by other means: it tells all but the depth."""
@@ -210,8 +297,9 @@ class BySurface:
             )
         self._cloud.step(dt, scene.view, PLACED_MIDDLE * self.body.height)
 
-    def _weighed(self, scene: Scene, seen: Silhouette, dt: float, missing: bool) -> Candidate:
-        body, motion = self.body, self.motion
+    def _weighed(self, account: Account, seen: Silhouette, dt: float, missing: bool) -> Candidate:
+        scene, body, motion = account.scene, self.body, self.motion
+        claim = account.claim(self._person, seen)
         placed = body.place(seen, scene.codes, scene.view, motion.position, motion.sigma)
         variance = np.square(motion.sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
@@ -220,24 +308,29 @@ class BySurface:
         else:
             step = float((away / variance).sum())
         at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
-        known, kin = self._bystanders.of(seen, scene.surfaces)
-        if not self._parameters.use_bystanders:
-            known = kin = 0.0
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
-            pale=max(0.0, body.likeness - placed.likeness) if self._parameters.use_color else 0.0,
-            known=known,
-            kin=kin,
             fraction=placed.fraction,
             height=_misfit(
                 seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
             ),
-            hidden=self.hidden_for,
+            gone=self.hidden_for + dt,
             missing=missing,
-            inland=0.0 if seen.at_edge(scene.view, scene.rim) else self._gone,
+            inland=0.0 if self._came_in(account, seen) else self._gone,
+            look=claim.look if self._parameters.use_color else 0.0,
+            mine=claim.mine if self._parameters.use_others else 0.0,
+            rival=claim.rival if self._parameters.use_others else 0.0,
+            room=claim.room if self._parameters.use_room else 0.0,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
+
+    def _came_in(self, account: Account, seen: Silhouette) -> bool:
+        """Whether a candidate is at the edge of what the camera sees, or came in there."""
+        if seen.at_edge(account.scene.view, account.scene.rim):
+            return True
+        stranger = account.stranger(self._person, account.sight_of(seen))
+        return stranger is not None and stranger.entered
 
     def _outline(self, view: DepthView) -> tuple[float, float, float, float]:
         """Where the whole body is expected: left, top, right, bottom in pixels of the view."""
@@ -298,36 +391,7 @@ class BySurface:
         left, top, right, bottom = (v * view.step for v in self._outline(view))
         return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))
 
-    def _remember(self, scene: Scene, target: Silhouette | None) -> None:
-        possible = self._may_come_out(scene)
-        for c in self.candidates:
-            if c.placed.likeness > self.body.likeness - 0.12 and c.evidence.known < 0.75:
-                possible[c.seen.label] = True
-        self._bystanders.remember(
-            scene.view,
-            scene.surfaces,
-            target,
-            self._outline_slices(scene.view),
-            possible,
-            0.05 * self.body.area,
-        )
-
-    def _may_come_out(self, scene: Scene) -> npt.NDArray[np.bool_]:
-        """Surfaces where a target that has not been hidden for long may come out, ``(n,)``."""
-        boxes = scene.surfaces.boxes
-        rows, cols = self._outline_slices(scene.view)
-        x, _, z = self.motion.sigma
-        beside = int(min(x, 0.5) * scene.view.intrinsics.fx / max(self.motion.position[2], 0.3))
-        near = np.abs(scene.surfaces.depth - self.motion.position[2]) < 0.25 + min(z, 0.25)
-        near &= (boxes[:, 0] < cols.stop + beside) & (boxes[:, 1] < rows.stop)
-        near &= boxes[:, 0] + boxes[:, 2] > cols.start - beside
-        near &= boxes[:, 1] + boxes[:, 3] > rows.start
-        result: npt.NDArray[np.bool_] = near & (
-            self.body.area * 1.7 > scene.surfaces.areas(scene.view.intrinsics)
-        )
-        return result
-
-    def _learn_around(self, scene: Scene, dt: float | None) -> None:
+    def _learn_around(self, scene: Scene, seen: Silhouette, dt: float | None) -> None:
         """Learn the colours beside the target."""
         left, top, right, bottom = self._outline(scene.view)
         rows, cols = scene.view.shape
@@ -336,7 +400,9 @@ class BySurface:
         x1 = int(np.clip(right + wide, x0 + 1, cols))
         y0 = int(np.clip(top, 0, rows - 2))
         y1 = int(np.clip(bottom, y0 + 1, rows))
-        other = self._bystanders.beside(slice(y0, y1), slice(x0, x1))
+        other = scene.view.depth > 0
+        other[seen.rows, seen.cols] &= ~seen.mask
+        other = other[y0:y1, x0:x1]
         self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:

@@ -54,6 +54,12 @@ class MetricParameters(Parameters):
         minimum=0.01,
         maximum=0.99,
     )
+    recognition: float = parameter(
+        0.65,
+        'The same after an absence of a second or more: a stranger is worse than no box.',
+        minimum=0.01,
+        maximum=0.99,
+    )
     least_visible: float = parameter(
         0.17,
         'Share of the body below which it counts as hidden.',
@@ -80,7 +86,8 @@ class MetricParameters(Parameters):
     use_particles: bool = parameter(
         True, 'Carry particles while hidden, else the motion filter alone.'
     )
-    use_bystanders: bool = parameter(True, 'Refuse what was seen beside the target.')
+    use_others: bool = parameter(True, 'Refuse what is better explained as somebody else.')
+    use_room: bool = parameter(True, 'Refuse what stood still while the target was elsewhere.')
     use_color: bool = parameter(True, 'Compare the colours of candidates.')
     use_surfaces: bool = parameter(True, 'Follow surfaces in depth, else the look alone.')
     use_look: bool = parameter(

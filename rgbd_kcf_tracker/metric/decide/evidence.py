@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-OTHER_COLORS = 0.2
-"""Loss of likeness from which it is another colour rather than another light."""
 FADE = 1.0
 """Seconds after which a hidden target's last place says a third of what it said."""
+AWAY = 0.5
+"""Seconds after which two thirds of what holds for a target that is followed no longer holds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,32 +28,42 @@ class Evidence:
     Attributes:
         step: squared Mahalanobis distance from where the target was expected.
         stride: the same for a target that may also have moved at will.
-        pale: by how much its colours are less like the target's than they mostly are, 0 to 1.
-        known: share of its pixels that were seen beside the target, 0 to 1.
-        kin: how well it fits a thing that was seen beside the target, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
         height: squared-error term of its height, at most 0; 0 where it fits or is cut off.
-        hidden: seconds since the target was last seen; 0 while it is followed.
+        gone: seconds since the target was last seen, the step to this frame included.
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
+        look: log-odds of its look by the target's gallery.
+        mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
+        rival: log-odds that it is somebody else, at least 0.
+        room: share of its pixels that stood still before, for a target that has walked.
     """
 
     step: float
     stride: float
-    pale: float
-    known: float
-    kin: float
     fraction: float
     height: float
-    hidden: float
+    gone: float
     missing: bool
     inland: float
+    look: float
+    mine: float
+    rival: float
+    room: float
+
+    @property
+    def behind(self) -> float:
+        """By how much somebody else explains the figure better than the target does, log-odds."""
+        return max(0.0, self.rival - max(self.mine, 0.0))
 
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
-        near = float(np.exp(-self.hidden / FADE))
-        away = 1.0 if self.hidden > 0 else 0.0
+        near = float(np.exp(-self.gone / FADE))
+        away = 1.0 - float(np.exp(-self.gone / AWAY))
+        look = min(max(self.look, -6.0), 5.0)
+        mine = min(max(self.mine, -6.0), 8.0)
+        behind = min(self.behind, 8.0)
         log_fraction = float(np.log(max(self.fraction, 1e-3)))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
@@ -61,20 +71,20 @@ class Evidence:
                 np.log1p(self.step) * near,
                 np.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
-                self.pale,
-                max(0.0, self.pale - OTHER_COLORS),
-                self.known,
-                self.kin,
                 more**2,
                 less,
                 max(self.height, -8.0),
                 away,
-                np.log1p(self.hidden),
-                away * self.known,
-                away * self.kin,
+                np.log1p(self.gone),
                 away * less,
                 float(self.missing),
                 away * self.inland,
+                look,
+                away * look,
+                mine,
+                away * mine,
+                behind,
+                away * behind,
                 1.0,
             )
         )
@@ -82,8 +92,8 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.651, -1.680, -0.117, -6.946, -2.522, -1.543, -1.486, -2.365, -3.623, 0.641,
-        -0.230, -1.093, -1.874, 0.363, 0.859, -0.489, -3.048, 6.541,
+        -0.62, -2.16, -0.04, -1.70, -2.92, -0.01, -2.20, -1.11, 1.44, -0.68, -2.53, 0.51,
+        0.14, 0.17, 0.46, -0.15, -0.91, 3.80,
     )
 )  # fmt: skip
 

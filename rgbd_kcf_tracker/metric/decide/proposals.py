@@ -17,12 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
-from rgbd_kcf_tracker.metric.identity.bystanders import Bystanders
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import cut
 
 FloatArray = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 LEAST_PIXELS = 12
 LEAST_SHARE = 0.06
@@ -75,7 +75,7 @@ class Facts:
 
 
 def propose(
-    scene: Scene, body: Body, expected: Expectation, bystanders: Bystanders, most: int
+    scene: Scene, body: Body, expected: Expectation, others: Mask, most: int
 ) -> list[Silhouette]:
     """Surfaces within reach, as they are and cut to the target.
 
@@ -83,7 +83,7 @@ def propose(
         scene: of now.
         body: the target.
         expected: where it is expected.
-        bystanders: what is known not to be it, compared with this scene.
+        others: ``(h, w)`` bool, pixels known not to be it.
         most: largest number of whole surfaces to propose, the nearest to ``expected`` first.
     """
     facts = Facts.of(scene)
@@ -103,13 +103,13 @@ def propose(
     if len(labels) > most:
         labels = labels[np.argsort(away[labels])[:most]]
     found = [scene.silhouette(int(label)) for label in labels]
-    found += _split(scene, body, expected, bystanders, facts)
-    narrow = (_narrowed(scene, body, seen, expected, bystanders) for seen in found)
+    found += _split(scene, body, expected, others, facts)
+    narrow = (_narrowed(scene, body, seen, expected, others) for seen in found)
     return found + [seen for seen in narrow if seen is not None]
 
 
 def _split(
-    scene: Scene, body: Body, expected: Expectation, bystanders: Bystanders, facts: Facts
+    scene: Scene, body: Body, expected: Expectation, others: Mask, facts: Facts
 ) -> list[Silhouette]:
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
@@ -118,7 +118,8 @@ def _split(
     if z < 0.2:
         return []
     large = facts.area > TOO_LARGE * body.area
-    large |= (bystanders.share > MIXED) & (facts.area > body.area)
+    if others.any():
+        large |= (_shares(scene, others) > MIXED) & (facts.area > body.area)
     large[0] = False
     if not large.any():
         return []
@@ -134,7 +135,7 @@ def _split(
     depth = view.depth[top:bottom, left:right]
     mask = large[scene.surfaces.labels[top:bottom, left:right]]
     mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
-    mask &= ~bystanders.known[top:bottom, left:right]
+    mask &= ~others[top:bottom, left:right]
     if not mask.any():
         return []
     pieces = cut(depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre)
@@ -154,14 +155,14 @@ def _narrowed(
     body: Body,
     seen: Silhouette,
     expected: Expectation,
-    bystanders: Bystanders,
+    others: Mask,
 ) -> Silhouette | None:
     """The part of a too wide silhouette that most likely is the target, by colour and place."""
     k = scene.view.intrinsics
     wanted = body.width * 1.1
     if not body.width_known or seen.width < 1.3 * wanted:
         return None
-    known = bystanders.known[seen.rows, seen.cols]
+    known = others[seen.rows, seen.cols]
     if seen.area < TOO_LARGE * body.area and known[seen.mask].mean() < MIXED:
         return None
     cols = max(2, round(wanted * k.fx / seen.depth))
@@ -187,8 +188,15 @@ def _narrowed(
     )
 
 
+def _shares(scene: Scene, others: Mask) -> FloatArray:
+    """Share of each surface's pixels that are others', ``(n,)``."""
+    surfaces = scene.surfaces
+    total = np.bincount(surfaces.labels[others], minlength=len(surfaces))
+    return np.asarray(total / np.maximum(surfaces.pixels, 1))
+
+
 def gathered(
-    scene: Scene, body: Body, seen: Silhouette, placed: Placed, bystanders: Bystanders
+    scene: Scene, body: Body, seen: Silhouette, placed: Placed, others: Mask
 ) -> Silhouette | None:
     """A silhouette with the pieces that lie within the body that it belongs to.
 
@@ -212,7 +220,7 @@ def gathered(
     inside = (boxes[:, 0] >= left) & (boxes[:, 0] + boxes[:, 2] <= right)
     inside &= (boxes[:, 1] >= top) & (boxes[:, 1] + boxes[:, 3] <= bottom)
     inside &= np.abs(surfaces.depth - seen.depth) < 0.2 + 0.02 * seen.depth
-    inside &= (surfaces.pixels >= 3) & (bystanders.share < 0.5)
+    inside &= (surfaces.pixels >= 3) & (_shares(scene, others) < 0.5)
     inside[0] = False
     inside[seen.label] = False
     more = boxes[inside]

@@ -22,6 +22,25 @@ LIKE = 0.25
 """Share of a column's pixels in the body's colours up to which it is taken to go on."""
 
 
+def outline_box(scene: Scene, seen: Silhouette) -> Box:
+    """The box of a silhouette of whose body nothing more is known, down to its feet."""
+    step = scene.view.step
+    return Box.from_corners(
+        seen.left * step, seen.top * step, seen.cols.stop * step, _foot(scene, seen) * step
+    )
+
+
+def _foot(scene: Scene, seen: Silhouette) -> float:
+    """Row of the view in which a silhouette ends, feet included."""
+    rows, cols = seen.mask.shape
+    bottom = float(seen.top + rows)
+    if scene.floor is not None and not seen.cut.bottom:
+        foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
+        if 0 < (foot - bottom) * seen.depth / scene.view.intrinsics.fy < FOOT:
+            return foot
+    return bottom
+
+
 def visible_box(scene: Scene, body: Body, seen: Silhouette, top: float) -> Box:
     """The box of a silhouette in pixels of the image.
 
@@ -34,13 +53,9 @@ def visible_box(scene: Scene, body: Body, seen: Silhouette, top: float) -> Box:
         seen: its silhouette.
         top: metres, of the body's upper edge.
     """
-    rows, cols = seen.mask.shape
+    cols = seen.mask.shape[1]
     left, right = float(seen.left), float(seen.left + cols)
-    bottom = float(seen.top + rows)
-    if scene.floor is not None and not seen.cut.bottom:
-        foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
-        if 0 < (foot - bottom) * seen.depth / scene.view.intrinsics.fy < FOOT:
-            bottom = foot
+    bottom = _foot(scene, seen)
     width = scene.view.shape[1]
     if scene.rim.left > RIM and left <= scene.rim.left + RIM:
         left -= _beyond_rim(scene, body, seen, top, -1)

@@ -34,7 +34,6 @@ MOST_GROWTH = 1.7
 """Area against the usual one from which a body has more likely run together with another."""
 COLOR_TIME = 1.0
 """Seconds in which the colours follow."""
-FIRST_LIKENESS = 0.9
 ANCHOR = 0.03
 ANCHOR_PER_METRE = 0.01
 WOBBLE = 0.06
@@ -52,15 +51,11 @@ class Placed:
     Attributes:
         position: ``(3,)`` metres: the middle of the body across, its top, its depth.
         sigma: ``(3,)`` metres, how sure that is; large where the side that tells it is cut off.
-        histograms: ``(BANDS, CODES)`` of its colours.
-        likeness: of its colours to the body's, 0 to 1.
         fraction: of the body that shows; above 1 where more shows than is known of.
     """
 
     position: FloatArray
     sigma: FloatArray
-    histograms: npt.NDArray[np.float32]
-    likeness: float
     fraction: float
 
 
@@ -74,7 +69,6 @@ class Body:
         width, height: metres.
         area: square metres seen from the camera.
         width_known, height_known: False until both of its ends have been seen.
-        likeness: mean of what :class:`Placed` says of it while it is in sight.
     """
 
     def __init__(self, first: Silhouette) -> None:
@@ -82,7 +76,6 @@ class Body:
         self.width_known = not (first.cut.left or first.cut.right)
         self.height_known = not (first.cut.top or first.cut.bottom)
         self._usual_area = first.area
-        self.likeness = FIRST_LIKENESS
         self._colors = np.zeros((BANDS, CODES), np.float32)
         self._around = np.full(CODES, 1 / CODES, np.float32)
         self.odds = np.zeros((BANDS, CODES), np.float32)
@@ -110,20 +103,16 @@ class Body:
         y, y_sigma = self._top(seen, expected[1])
         z = seen.depth
         fraction = self._fraction(seen)
-        crop = codes[seen.rows, seen.cols]
-        counts = self._histograms(seen, crop, view, y)
-        likeness = band_similarity(counts, self._colors)
         lower = y - expected[1] > 0.08 * self.height
         if expected_sigma is not None and lower and fraction < 0.8 and expected_sigma[1] < 0.3:
             # The head may be hidden without a nearer surface beside it: see whether the colours
             # fit the parts lower down.
-            counts_below = self._histograms(seen, crop, view, expected[1])
-            likeness_below = band_similarity(counts_below, self._colors)
-            if likeness_below > likeness:
-                counts, likeness = counts_below, likeness_below
+            here = band_similarity(self._histograms(seen, codes, view, y), self._colors)
+            below = self._histograms(seen, codes, view, expected[1])
+            if band_similarity(below, self._colors) > here:
                 y, y_sigma = float(expected[1]), y_sigma + 0.2 * self.height
         sigma = np.hypot(WOBBLE, np.array([x_sigma, y_sigma, _depth_sigma(z)]))
-        return Placed(np.array([x, y, z]), sigma, counts, likeness, fraction)
+        return Placed(np.array([x, y, z]), sigma, fraction)
 
     def _fraction(self, seen: Silhouette) -> float:
         extent = seen.width * seen.height / (self.width * self.height)
@@ -160,10 +149,10 @@ class Body:
         return row, self.height * k.fy / seen.depth
 
     def _histograms(
-        self, seen: Silhouette, crop: Codes, view: DepthView, top: float
+        self, seen: Silhouette, codes: Codes, view: DepthView, top: float
     ) -> npt.NDArray[np.float32]:
         row, rows = self._rows(seen, view, top)
-        return band_histograms(crop, seen.mask, row, rows)
+        return band_histograms(codes[seen.rows, seen.cols], seen.mask, row, rows)
 
     def odds_of(
         self, codes: Codes, seen: Silhouette, view: DepthView, top: float
@@ -210,18 +199,25 @@ class Body:
         self.area *= max(1.0, factor)
         self._usual_area *= max(1.0, factor)
 
-    def learn_colors(self, placed: Placed, dt: float | None) -> None:
-        """Follow the colours; ``dt`` seconds since the last time, None at first."""
+    def learn_colors(
+        self, seen: Silhouette, codes: Codes, view: DepthView, top: float, dt: float | None
+    ) -> None:
+        """Follow the colours of a silhouette; ``dt`` seconds since the last time, None at first.
+
+        Args:
+            seen: the silhouette.
+            codes: ``(h, w)`` colour codes of the view.
+            view: the depth.
+            top: metres, of the body's upper edge.
+            dt: seconds.
+        """
+        counts = self._histograms(seen, codes, view, top)
         rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
-        total = placed.histograms.sum(axis=1)
+        total = counts.sum(axis=1)
         rates = np.where(self._colors.sum(axis=1) == 0, 1.0, rate)
         rates[total <= 8] = 0.0
         r = rates[:, None].astype(np.float32)
-        self._colors = (1 - r) * self._colors + r * (
-            placed.histograms / np.maximum(total, 1)[:, None]
-        )
-        if dt is not None:
-            self.likeness += rate * (placed.likeness - self.likeness)
+        self._colors = (1 - r) * self._colors + r * (counts / np.maximum(total, 1)[:, None])
 
     def learn_around(self, codes: Codes, known: npt.NDArray[np.bool_], dt: float | None) -> None:
         """Follow the colours of what stands beside the body: ``codes`` where ``known``."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 FloatArray = npt.NDArray[np.float64]
@@ -59,6 +60,11 @@ class HiddenCloud:
         spread = np.maximum(speed_sigma, 0.3 * ROAM)
         self._velocities = velocity + spread * rng.standard_normal((count, 3))
         self._weights = np.full(count, 1.0 / count)
+
+    def carried(self, motion: Pose) -> None:
+        """Keep the places in the world: ``motion`` is the last camera's pose in that of now."""
+        self._positions = motion.of(self._positions)
+        self._velocities = self._velocities @ motion.rotation.T
 
     def step(self, dt: float, view: DepthView, middle: float) -> None:
         """Move on by ``dt`` seconds and weigh by what the camera sees.

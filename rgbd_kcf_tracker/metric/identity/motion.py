@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.geometry import Pose
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -57,6 +59,11 @@ class MotionFilter:
         self._p00 = self._p00 + 2 * dt * self._p01 + dt * dt * self._p11 + q * dt**4 / 4
         self._p01 = self._p01 + dt * self._p11 + q * dt**3 / 2
         self._p11 = self._p11 + q * dt**2
+
+    def carried(self, motion: Pose) -> None:
+        """Keep the place in the world: ``motion`` is the last camera's pose in that of now."""
+        self.position = motion.of(self.position)
+        self.velocity = motion.rotation @ self.velocity
 
     def correct(self, position: FloatArray, sigma: FloatArray) -> None:
         """Take a measured position, ``(3,)`` metres, each axis with its own deviation."""

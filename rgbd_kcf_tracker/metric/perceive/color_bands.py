@@ -26,10 +26,10 @@ _CHROMA = np.clip(
 ).astype(np.uint16)
 
 
-def view_lab(
+def view_image(
     color: npt.NDArray[np.uint8], step: int, shape: tuple[int, int]
 ) -> npt.NDArray[np.uint8]:
-    """CIE Lab of every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
+    """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
 
     Args:
         color: the image.
@@ -40,23 +40,22 @@ def view_lab(
         ``shape + (3,)`` uint8.
     """
     half = step // 2
-    small = np.ascontiguousarray(color[half::step, half::step][: shape[0], : shape[1]])
-    lab: npt.NDArray[np.uint8] = cv2.cvtColor(small, cv2.COLOR_BGR2LAB)
+    return np.ascontiguousarray(color[half::step, half::step][: shape[0], : shape[1]])
+
+
+def view_lab(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """CIE Lab of an image, ``(h, w, 3)`` uint8 BGR."""
+    lab: npt.NDArray[np.uint8] = cv2.cvtColor(image, cv2.COLOR_BGR2LAB)
     return lab
 
 
-def color_codes(lab: npt.NDArray[np.uint8], brighter: float = 0.0) -> npt.NDArray[np.int32]:
+def color_codes(lab: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
     """Code 0 to 511 of each pixel: 64 times lightness plus 8 times red-green plus blue-yellow.
 
     Args:
         lab: ``(h, w, 3)`` uint8 CIE Lab.
-        brighter: by how much the light has gone up since the codes were first used, 0 to 255;
-            taken off again, so that codes before and after a change of light compare.
     """
-    lightness = lab[:, :, 0]
-    if brighter:
-        lightness = np.clip(lightness - np.float32(brighter), 0, 255).astype(np.uint8)
-    codes = (_LIGHTNESS[lightness] << 6) + (_CHROMA[lab[:, :, 1]] << 3) + _CHROMA[lab[:, :, 2]]
+    codes = (_LIGHTNESS[lab[:, :, 0]] << 6) + (_CHROMA[lab[:, :, 1]] << 3) + _CHROMA[lab[:, :, 2]]
     result: npt.NDArray[np.int32] = codes.astype(np.int32)
     return result
 

@@ -29,12 +29,16 @@ SAMPLES = 600
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A plane in a view: ``1/z = a u + b v + c`` with the camera ``height`` metres above it."""
+    """A plane in a view: ``1/z = a u + b v + c`` with the camera ``height`` metres above it.
+
+    ``tilt`` is the sine of the angle by which the camera looks down.
+    """
 
     a: float
     b: float
     c: float
     height: float
+    tilt: float = 0.0
 
     def elevation(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         """Metres above the floor of each pixel, ``(h, w)`` float32; ``height`` where depth is 0."""
@@ -46,6 +50,27 @@ class Floor:
         np.subtract(np.float32(1.0), above, out=above)
         above *= np.float32(self.height)
         return above
+
+    def forward(
+        self, depth: npt.NDArray[np.float32], elevation: npt.NDArray[np.float32]
+    ) -> npt.NDArray[np.float32]:
+        """Metres from the camera along the floor of each pixel, ``(h, w)`` float32.
+
+        Of an upright body it is the same from head to feet, which depth is not where the camera
+        looks down.
+        """
+        ahead: npt.NDArray[np.float32] = elevation - np.float32(self.height)
+        ahead *= np.float32(self.tilt)
+        ahead += depth
+        ahead *= np.float32(1 / np.sqrt(1 - self.tilt**2))
+        return ahead
+
+    def ahead(self, k: Intrinsics) -> npt.NDArray[np.float64]:
+        """Unit vector along the floor away from the camera, ``(3,)`` in the camera's frame."""
+        down = np.array([self.a * k.fx, self.b * k.fy, self.c + self.a * k.cx + self.b * k.cy])
+        down *= self.height
+        level = np.array([0.0, 0.0, 1.0]) - down[2] * down
+        return np.asarray(level / np.linalg.norm(level))
 
     def row_at(self, u: float, z: float) -> float:
         """Row in which the floor is seen in column ``u`` at depth ``z``."""
@@ -155,4 +180,5 @@ class FloorFinder:
         height = _height(plane, k)[0]
         if not np.isfinite(height):
             return None
-        return Floor(float(plane[0, 0]), float(plane[0, 1]), float(plane[0, 2]), float(height))
+        a, b, c = (float(v) for v in plane[0])
+        return Floor(a, b, c, float(height), (c + a * k.cx + b * k.cy) * float(height))

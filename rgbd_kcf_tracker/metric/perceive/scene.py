@@ -11,15 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_lab
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_image, view_lab
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
+from rgbd_kcf_tracker.metric.perceive.light import Light
+from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
-
-SUDDEN = 4.0
-"""Change of median lightness (of 255) from one frame to the next that is a change of light."""
-LIGHT_STEP = 3
+from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,18 +30,37 @@ class Scene:
     Attributes:
         view: the depth.
         floor: the floor, or None where none was found.
+        elevation: ``(h, w)`` float32 metres above the floor, or None likewise.
+        forward: ``(h, w)`` float32 metres along the floor, or along the optical axis where no floor
+            is known.
+        standing: ``(h, w)`` bool, pixels with a reading that are not floor.
+        before: ``(h, w)`` bool, pixels that show something before the room.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         codes: ``(h, w)`` int32 colour codes.
-        lab: ``(h, w, 3)`` uint8 CIE Lab.
+        lab: ``(h, w, 3)`` uint8 CIE Lab, in the light of the first frame.
+        motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
+            where it has moved and nothing tells how.
     """
 
     view: DepthView
     floor: Floor | None
+    elevation: npt.NDArray[np.float32] | None
+    forward: npt.NDArray[np.float32]
+    standing: npt.NDArray[np.bool_]
+    before: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     codes: npt.NDArray[np.int32]
     lab: npt.NDArray[np.uint8]
+    motion: Pose | Lost | None
+
+    @property
+    def ahead(self) -> npt.NDArray[np.float64]:
+        """Unit vector along the floor away from the camera, ``(3,)`` in the camera's frame."""
+        if self.floor is None:
+            return np.array([0.0, 0.0, 1.0])
+        return self.floor.ahead(self.view.intrinsics)
 
     def silhouette(self, label: int) -> Silhouette:
         """One surface as a silhouette."""
@@ -51,6 +71,12 @@ class Scene:
 
 class SceneReader:
     """Reads frames of one stream; what does not change between them is remembered.
+
+    Attributes:
+        room: what stands still.
+        somebody: ``(h, w)`` bool, pixels of the last view that belong to somebody, who may stand
+            still without becoming part of the room; to be set by who decides. None for nobody.
+        last_view: the depth of the last frame that had any.
 
     Args:
         width: columns of the view.
@@ -70,12 +96,15 @@ class SceneReader:
         self._floors = FloorFinder(seed)
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
-        self._lightness: npt.NDArray[np.int16] | None = None
-        self._brighter = 0.0
+        self._light = Light()
+        self._ego = EgoMotion()
+        self._pose: Pose | None = None
+        self.room = Room()
+        self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
 
-    def read(self, frame: Frame) -> Scene | None:
-        """The scene of a frame, or None where it has no depth."""
+    def read(self, frame: Frame, seconds: float) -> Scene | None:
+        """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
         view = DepthView.of(frame, self._width)
         if view is None:
             return None
@@ -84,20 +113,47 @@ class SceneReader:
             self._rim, self._shape = None, view.shape
         floor = self._floors.update(view) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
+        forward = view.depth
+        if floor is not None and elevation is not None:
+            forward = floor.forward(view.depth, elevation)
         mask = standing(view, elevation, self._floor_margin)
         surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
-        lab = view_lab(frame.color, view.step, view.shape)
-        codes = color_codes(lab, self._light(lab))
-        return Scene(view, floor, surfaces, self._rim, codes, lab)
+        image = view_image(frame.color, view.step, view.shape)
+        motion = self._move(image, view, frame.pose)
+        if isinstance(motion, Lost) and self.room.agrees(view.depth):
+            motion = None
+        fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
+        if fresh:
+            people = upright_people(view, surfaces, elevation, self._rim)
+            self.room.restart(view.depth, people)
+            self._light.restart()
+        else:
+            somebody = self.somebody
+            if isinstance(motion, Pose):
+                unknown = self.room.moved(motion, view.intrinsics)
+                people = upright_people(view, surfaces, elevation, self._rim)
+                self.room.open(people & unknown, view.depth)
+                self._light.restart()
+                somebody = None
+            self.room.update(view.depth, seconds, somebody)
+        before = self.room.before
+        lab = view_lab(self._light.steadied(image, ~before))
+        codes = color_codes(lab)
+        return Scene(
+            view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab, motion
+        )
 
-    def _light(self, lab: npt.NDArray[np.uint8]) -> float:
-        """How much brighter the scene is than at first, by sudden changes of all of it."""
-        lightness = lab[::LIGHT_STEP, ::LIGHT_STEP, 0].astype(np.int16)
-        if self._lightness is not None and self._lightness.shape == lightness.shape:
-            change = float(np.median(lightness - self._lightness))
-            if abs(change) >= SUDDEN:
-                self._brighter = float(np.clip(self._brighter + change, -128, 128))
-        self._lightness = lightness
-        return self._brighter
+    def _move(
+        self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
+    ) -> Pose | Lost | None:
+        """How the camera has moved: by its poses where both frames have one, else as it seems."""
+        last, self._pose = self._pose, now
+        before = self.room.before
+        if before.shape != view.shape:
+            before = np.zeros(view.shape, np.bool_)
+        seems = self._ego.update(image, view, before)
+        if last is None or now is None:
+            return seems
+        return last.after(now.inverse)

@@ -1,0 +1,433 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Everyone in view, explained together: each figure is somebody known, or somebody new."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linear_sum_assignment
+
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.identity.gallery import Looks, View, similarity
+from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
+from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import upright
+
+FloatArray = npt.NDArray[np.float64]
+
+NEW = 0.0
+"""Log-odds of being somebody known from which a figure is not somebody new."""
+RETURN, RETURN_AFTER = 1.5, 1.5
+"""Log-odds against somebody who has been away for as many seconds coming back just now rather than
+somebody new."""
+SURE = 1.0
+"""Log-odds by which an identity must be ahead of all others to be learned from."""
+WHOLE = 0.2
+"""Square metres of a figure from which its view is learned."""
+NEW_AREA = 0.12
+"""Square metres of a figure from which it is somebody new."""
+SMALL = 0.1
+"""Square metres of a thing up to which it may be part of somebody's figure."""
+STEP, STEP_PER_SECOND = 0.3, 1.0
+"""Metres in depth by which somebody's pixels differ, and may have moved on from one sight to the
+next."""
+PART_OF_ROOM = 0.3
+"""Share of a silhouette that shows the room up to which it stands before it."""
+BESIDE = 0.5
+"""Metres between two who are surely two, and not a person and a piece of the same."""
+NEW_SCORE = 0.5
+"""Score of somebody who has just come into view."""
+MOST_PEOPLE = 48
+"""People who are remembered beside the chosen ones; who was seen longest ago is forgotten."""
+SETTLED = 3
+"""Frames after which the room is known."""
+HELD = -2
+"""Owner of a sight that may be a target which was not found: nobody new is made of it."""
+SAME = 0.8
+"""Share of a figure's area from which a silhouette that is part of it looks as it does."""
+MOST = 0.5
+"""Share of a silhouette's pixels from which it is taken to be the same as a figure."""
+REUNION = 1.0
+"""Seconds of absence after which somebody who was chosen is recognised by more than his place."""
+RECENT = 0.6
+"""Seconds after the last sight for which a figure is parted where somebody is expected."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """A figure with its look."""
+
+    figure: Figure
+    view: View
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What the others in view say of a candidate.
+
+    Attributes:
+        look: log-odds that its look is the target's.
+        mine: log-odds, place and look together, that the figure which it is part of is the
+            target; 0 where it is part of none.
+        rival: log-odds that it is somebody else who was seen beside the target, at least 0:
+            somebody new is always possible.
+        room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
+    """
+
+    look: float
+    mine: float
+    rival: float
+    room: float
+
+
+@dataclass(slots=True, eq=False)
+class Account:
+    """How a frame is explained.
+
+    Attributes:
+        scene: what it shows.
+        time: seconds.
+        sights: what stands before the room, ``n`` of them.
+        people: all who are known, ``m`` of them.
+        odds: ``(m, n)`` log-odds of each being each.
+        looks: ``(m, n)`` the part of the look and the height in them.
+        settled: whether the room has been seen for long enough to tell what stands before it.
+        owner: for each sight the index among ``people``, or -1.
+    """
+
+    scene: Scene
+    time: float
+    sights: list[Sight]
+    people: list[Person]
+    odds: FloatArray
+    looks: FloatArray
+    settled: bool
+    owner: list[int] = field(default_factory=list)
+    _which: npt.NDArray[np.int16] | None = None
+
+    @property
+    def which(self) -> npt.NDArray[np.int16]:
+        """For each pixel the number of its sight from 1, or 0, ``(h, w)``."""
+        if self._which is None:
+            self._which = np.zeros(self.scene.view.shape, np.int16)
+            for number, sight in enumerate(self.sights, 1):
+                seen = sight.figure.seen
+                self._which[seen.rows, seen.cols][seen.mask] = number
+        return self._which
+
+    def place(self, seen: Silhouette) -> FloatArray:
+        """Where a silhouette is, ``(2,)`` metres across and along the floor."""
+        left, _, right, _ = seen.metres
+        ahead = float(self.scene.forward[seen.rows, seen.cols][seen.mask].mean())
+        return np.array([(left + right) / 2, ahead])
+
+    def probability(self, row: int, column: int) -> float:
+        """That a sight is of one of the people rather than of any other, 0 to 1."""
+        if row >= len(self.odds):
+            return NEW_SCORE
+        odds = self.odds[:, column]
+        others = np.delete(odds, row)
+        total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
+        return float(1 / (1 + total * np.exp(-min(odds[row], 30))))
+
+    def sight_of(self, seen: Silhouette) -> int:
+        """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
+        if not self.sights:
+            return -1
+        pixels = self.which[seen.rows, seen.cols][seen.mask]
+        counts = np.bincount(pixels, minlength=len(self.sights) + 1)
+        best = int(np.argmax(counts[1:]))
+        return best if counts[best + 1] > MOST * len(pixels) else -1
+
+    def look(self, seen: Silhouette) -> View:
+        """The look of any silhouette of the frame."""
+        for sight in self.sights:
+            if sight.figure.seen is seen:
+                return sight.view
+        top = None
+        scene = self.scene
+        if scene.elevation is not None and not seen.cut.top:
+            top = float(np.percentile(scene.elevation[seen.rows, seen.cols][seen.mask], 98))
+        return View.of(scene.view, scene.lab, seen, top)
+
+    def claim(self, person: Person, seen: Silhouette) -> Claim:
+        """What all that is known of the frame says of a silhouette being ``person``."""
+        # A small thing is no figure, but may be in the hands or at the feet of one.
+        index = self.sight_of(seen) if person.area >= SMALL else -1
+        look = None
+        stranger = self.stranger(person, index)
+        if stranger is not None:
+            look = stranger.resemblance(person.number)
+        if look is None and index >= 0 and person in self.people[: len(self.looks)]:
+            whole = self.sights[index].figure.seen
+            if SAME < whole.area / seen.area < 1 / SAME:
+                look = float(self.looks[self.people.index(person), index])
+        if look is None:
+            look = person.gallery.log_odds(self.look(seen))
+        rival = mine = 0.0
+        if index >= 0:
+            for row, other in enumerate(self.people[: len(self.odds)]):
+                if other is person:
+                    mine = float(self.odds[row, index])
+                elif other.number in person.met:
+                    rival = max(rival, float(self.odds[row, index]))
+        return Claim(look, mine, rival, self._room_beside(person, seen))
+
+    def room_share(self, seen: Silhouette) -> float:
+        """Share of a silhouette's pixels that show the room, 0 to 1."""
+        before = self.scene.before[seen.rows, seen.cols][seen.mask]
+        return 1.0 - np.count_nonzero(before) / len(before)
+
+    def _room_beside(self, person: Person, seen: Silhouette) -> float:
+        """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
+        share = self.room_share(seen)
+        last = person.last
+        if person.mobile or share == 0:
+            return share
+        if last is None:
+            return 0.0
+        y0, y1 = max(seen.rows.start, last.rows.start), min(seen.rows.stop, last.rows.stop)
+        x0, x1 = max(seen.cols.start, last.cols.start), min(seen.cols.stop, last.cols.stop)
+        if y0 >= y1 or x0 >= x1:
+            return share
+        # What the outline of the last sight holds, about as deep, may have been the person.
+        mine = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
+        step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)
+        mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
+        return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
+
+    def others(self, person: Person) -> npt.NDArray[np.bool_]:
+        """The pixels that are surely not a person's, ``(h, w)`` bool.
+
+        They belong to somebody who was seen beside him, or are the room where he is no part of it.
+        """
+        theirs = np.zeros(len(self.sights) + 1, np.bool_)
+        theirs[0] = person.mobile
+        for number, owner in enumerate(self.owner, 1):
+            met = owner >= 0 and self.people[owner].number in person.met
+            theirs[number] = met and person.area >= SMALL
+        if not theirs.any():
+            return np.zeros(self.which.shape, np.bool_)
+        mask: npt.NDArray[np.bool_] = theirs[self.which]
+        if person.mobile:
+            mask &= ~(self.scene.before & (self.which == 0))
+        return mask
+
+    def stranger(self, person: Person, index: int) -> Person | None:
+        """Who a sight is taken for, if that may be ``person`` under another number.
+
+        That is somebody who was never seen beside him.
+        """
+        if index < 0 or self.owner[index] < 0:
+            return None
+        other = self.people[self.owner[index]]
+        if other is person or other.chosen or other.number in person.met:
+            return None
+        return other
+
+    def somebody(self) -> npt.NDArray[np.bool_]:
+        """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
+        mask = np.zeros(self.scene.view.shape, np.bool_)
+        for sight, owner in zip(self.sights, self.owner, strict=True):
+            if owner >= 0 and self.people[owner].alive:
+                seen = sight.figure.seen
+                mask[seen.rows, seen.cols] |= seen.mask
+        return mask
+
+
+class Crowd:
+    """Gives everyone who stands before the room an identity and keeps it.
+
+    Attributes:
+        people: all who are known.
+        time: seconds of the last frame.
+    """
+
+    def __init__(self) -> None:
+        self.people: list[Person] = []
+        self.time = 0.0
+        self._next = 1
+        self._frames = 0
+
+    def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
+        """Somebody new at ``place``, ``(2,)`` metres."""
+        others = [p for p in self.people if not p.chosen]
+        if len(others) >= MOST_PEOPLE:
+            self.people.remove(min(others, key=lambda p: (p.alive, p.seen_at)))
+        person = Person(self._next, place, time, chosen)
+        self._next += 1
+        self.people.append(person)
+        return person
+
+    def chosen(self, account: Account, seen: Silhouette) -> Person:
+        """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
+        index = account.sight_of(seen)
+        if index >= 0 and account.owner[index] >= 0:
+            person = account.people[account.owner[index]]
+            if account.time == person.seen_at:
+                person.chosen = True
+                return person
+        person = self.welcome(account.place(seen), account.time, chosen=True)
+        account.people.append(person)
+        if index >= 0:
+            account.owner[index] = len(account.people) - 1
+        self._see(account, len(account.people) - 1, seen, index)
+        return person
+
+    def explain(self, scene: Scene, time: float) -> Account:
+        """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
+        self.time = time
+        self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
+        if isinstance(scene.motion, Lost):
+            for person in self.people:
+                person.mobile, person.last = False, None
+        if isinstance(scene.motion, Pose):
+            for person in self.people:
+                person.carried(scene.motion, scene.ahead)
+        expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
+        figures = find_figures(scene, np.array(expected).reshape(-1, 2))
+        sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
+        settled = self._frames > SETTLED
+        odds, looks = self._odds(sights, time)
+        account = Account(scene, time, sights, list(self.people), odds, looks, settled)
+        account.owner = [-1] * len(sights)
+        if odds.size:
+            # Whoever was chosen and has been away comes back as a stranger first, until his looks
+            # have borne out over some sightings who he is.
+            away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
+            open_odds = np.where(np.array(away)[:, None], NEW - 1, odds)
+            rows, columns = linear_sum_assignment(-np.maximum(open_odds - NEW, 0))
+            for row, column in zip(rows, columns, strict=True):
+                if open_odds[row, column] > NEW:
+                    account.owner[column] = int(row)
+                    self._compare(account, int(row), column)
+        return account
+
+    def _compare(self, account: Account, row: int, column: int) -> None:
+        """Compare a sight of one person with those who were chosen and are away."""
+        for other, person in enumerate(account.people[: len(account.looks)]):
+            if person.chosen and other != row and account.time - person.seen_at > REUNION:
+                account.people[row].resembled(person.number, float(account.looks[other, column]))
+
+    def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
+        odds = np.zeros((len(self.people), len(sights)))
+        looks = np.zeros_like(odds)
+        if not odds.size:
+            return odds, looks
+        places = np.stack([s.figure.place for s in sights])
+        known = [p.gallery.looks for p in self.people if p.gallery.looks is not None]
+        everyone = Looks.joined(known) if known else None
+        starts = np.cumsum([0] + [len(each) for each in known[:-1]])
+        for column, sight in enumerate(sights):
+            best = []
+            if everyone is not None:
+                best = np.maximum.reduceat(similarity(sight.view, everyone), starts).tolist()
+            for row, person in enumerate(self.people):
+                alike = best.pop(0) if person.gallery.looks is not None else None
+                looks[row, column] = person.gallery.log_odds(sight.view, alike)
+        for row, person in enumerate(self.people):
+            odds[row] = person.place_log_odds(places, time)
+            if not person.chosen and time - person.seen_at > RETURN_AFTER:
+                odds[row] -= RETURN
+        odds += looks
+        return odds, looks
+
+    def learn(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+        """Take what was seen.
+
+        Args:
+            account: of the frame.
+            targets: where those who are followed by other means were found, by their numbers; None
+                where they were not: nobody else's sight of them counts.
+        """
+        people, time = account.people, account.time
+        for row, person in enumerate(people):
+            if person.number not in targets:
+                continue
+            for column, owner in enumerate(account.owner):
+                if owner == row:
+                    account.owner[column] = HELD
+            seen = targets[person.number]
+            if seen is None:
+                continue
+            index = account.sight_of(seen)
+            if index >= 0:
+                self._merge(account, row, account.owner[index])
+                account.owner[index] = row
+            self._see(account, row, seen, index)
+        for column, sight in enumerate(account.sights):
+            row = account.owner[column]
+            if row == HELD:
+                account.owner[column] = -1
+            elif row < 0:
+                if sight.figure.seen.area < NEW_AREA:
+                    continue
+                account.owner[column] = len(people)
+                newcomer = self.welcome(sight.figure.place, time)
+                newcomer.entered = sight.figure.seen.at_edge(account.scene.view, account.scene.rim)
+                people.append(newcomer)
+                self._see(account, len(people) - 1, sight.figure.seen, column)
+                self._compare(account, len(people) - 1, column)
+            elif people[row].number not in targets:
+                self._see(account, row, sight.figure.seen, column)
+        self._introduce(account, targets)
+
+    def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+        """Remember who was seen beside whom: they are surely not the same."""
+        seen_now: list[tuple[Person, FloatArray]] = []
+        for column, row in enumerate(account.owner):
+            figure = account.sights[column].figure
+            if row < 0 or account.people[row].number in targets:
+                continue
+            if figure.seen.area > WHOLE and not figure.parted:
+                seen_now.append((account.people[row], figure.place))
+        for person in account.people:
+            seen = targets.get(person.number)
+            if seen is not None:
+                seen_now.append((person, account.place(seen)))
+        for person, place in seen_now:
+            for other, there in seen_now:
+                if np.hypot(*(place - there)) > BESIDE:
+                    person.met.add(other.number)
+
+    def _merge(self, account: Account, row: int, other: int) -> None:
+        """Drop the number under which a target was known while it was not recognised."""
+        if other < 0 or other == row:
+            return
+        person, double = account.people[row], account.people[other]
+        if double.number in person.met or double.chosen:
+            return
+        if double in self.people:
+            self.people.remove(double)
+
+    def _see(self, account: Account, row: int, seen: Silhouette, index: int) -> None:
+        """Take one sighting of one person."""
+        person, scene = account.people[row], account.scene
+        place = account.place(seen)
+        if account.time > person.seen_at:
+            person.moved_to(place, account.time)
+        person.last = seen
+        person.area = max(person.area, seen.area)
+        # What is small lies as near to the room as the room's depth is uncertain.
+        if account.settled and seen.area > WHOLE:
+            person.mobile |= account.room_share(seen) < PART_OF_ROOM
+        view = account.look(seen)
+        if index >= 0 and row < len(account.odds):
+            others = np.delete(account.odds[:, index], row)
+            rival = max(0.0, float(others.max())) if len(others) else 0.0
+            if account.odds[row, index] - rival < SURE:
+                return
+        person.upright |= upright(seen, scene.view.intrinsics, view.top)
+        if view.top is not None and view.top > 1.2:
+            person.gallery.learn_height(view.top)
+        alone = index < 0 or not account.sights[index].figure.parted
+        whole = seen.area > WHOLE and not seen.cut.top and alone
+        if whole or not person.gallery.views:
+            person.gallery.learn(view)

@@ -1,0 +1,294 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Following one chosen target: by its surface, and by its look where depth says nothing of it."""
+
+from __future__ import annotations
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look
+from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.track import Track, TrackState
+
+ATTEND = 1.0
+"""Seconds after which the look of a target followed by its surface is learned again."""
+BLIND = 0.25
+"""Share of the expected body without a reading from which depth says nothing of it."""
+SUREST_LOOK = 0.9
+"""Score of a box found by look at full response: on colour alone about nine of ten are right."""
+RELOCK_IOU = 0.7
+RELOCK_FRAMES = 3
+"""Overlap of what the look finds with a surface, and for how long, to go over to the surface."""
+RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
+"""Sightings of a returning target, and seconds of them, after which it is the target for good, and
+the mean log-odds of its look that it takes."""
+STANDING = 0.6
+"""Share of a box's middle that shows the room from which it is taken to be no more than that."""
+NEWCOMER = 1.5
+"""Seconds after the last look at a target without a surface in which somebody new may be it."""
+NEWCOMER_AREA = 0.1
+"""Square metres of him, at the least."""
+COVERED = 0.6
+"""Share of a newcomer's outline that lies in the target's box, at the least."""
+NEW_SCORE = 0.8
+"""Score of a box when the target has just been found to be a newcomer."""
+
+
+class Follower:
+    """Follows one target from frame to frame.
+
+    Args:
+        frame: the first.
+        account: of the first frame, None where it has no depth.
+        crowd: everyone, of whom the target is one.
+        box: the target.
+        parameters: of the tracker.
+
+    Attributes:
+        person: the target as one of the crowd, None while depth says nothing of it.
+        seen: its silhouette in the last frame, None where it has none.
+    """
+
+    def __init__(
+        self,
+        frame: Frame,
+        account: Account | None,
+        crowd: Crowd,
+        box: Box,
+        parameters: MetricParameters,
+    ) -> None:
+        self._parameters = parameters
+        self._crowd = crowd
+        self._surface: BySurface | None = None
+        self._account: Account | None = None
+        self._hidden_for = 0.0
+        self._agreed = 0
+        self._last_box, self._unseen = box, 0.0
+        self._size_of_image = frame.width, frame.height
+        self._mobile = False
+        self._since = crowd.time
+        self.person: Person | None = None
+        self.seen: Silhouette | None = None
+        if account is not None:
+            self._lock(account, box)
+            self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
+        self._look: ByLook | None = None
+        if parameters.use_look or self._surface is None:
+            self._look = ByLook(frame, box, parameters)
+        self.track = self._tracked(frame, box, 1.0, self._depth_of_surface())
+
+    def weighed(self) -> list[tuple[Candidate, Box]]:
+        """What was weighed in the last frame, best first, and the box each would have given.
+
+        Empty while the target is followed by its look.
+        """
+        if self._surface is None or self._account is None:
+            return []
+        scene = self._account.scene
+        return [(c, self._surface.box(scene, c)) for c in self._surface.candidates]
+
+    def step(
+        self, frame: Frame, account: Account | None, view: DepthView | None, dt: float
+    ) -> Track:
+        """Follow the target into the next frame, ``dt`` seconds later.
+
+        Args:
+            frame: the frame.
+            account: what it shows, None where it has no depth.
+            view: the last depth there was, None where there never was any.
+            dt: seconds.
+        """
+        self._account = account
+        self.seen = None
+        if self._surface is None:
+            track = self._by_look(frame, account, dt)
+        else:
+            track = self._by_surface(frame, account, view, dt, self._surface)
+        self._hidden_for = 0.0 if track.box is not None else self._hidden_for + dt
+        self.track = track
+        return track
+
+    # -- by surface -------------------------------------------------------------------------------
+
+    def _lock(self, account: Account, box: Box) -> None:
+        seen = BySurface.surface_of(account, box)
+        if seen is None:
+            return
+        self.seen = seen
+        if self.person is None:
+            self.person = self._crowd.chosen(account, seen)
+        self._surface = BySurface(account, seen, self.person, self._parameters)
+
+    def _depth_of_surface(self) -> float | None:
+        return float(self._surface.motion.position[2]) if self._surface is not None else None
+
+    def _by_surface(
+        self,
+        frame: Frame,
+        account: Account | None,
+        view: DepthView | None,
+        dt: float,
+        surface: BySurface,
+    ) -> Track:
+        if account is None:
+            surface.motion.predict(dt)
+            return self._glance(frame, None, view, dt, surface)
+        found = surface.step(account, dt)
+        if found is None:
+            return self._glance(frame, account.scene, view, dt, surface)
+        stranger = None
+        if surface.hidden_for > REUNION and self.person is not None:
+            stranger = account.stranger(self.person, account.sight_of(found.seen))
+        if stranger is not None:
+            if not self._recognised(stranger, account.time):
+                box = surface.box(account.scene, found)
+                surface.miss(account.scene, dt)
+                return self._tracked(frame, box, found.probability, found.seen.depth)
+            surface.resume(found)
+        box = surface.take(account.scene, found, dt)
+        self.seen = found.seen
+        if self._look is not None and not found.seen.cut.any:
+            self._look.attend(frame, box, dt, ATTEND)
+        return self._tracked(frame, box, found.probability, found.seen.depth)
+
+    def _recognised(self, stranger: Person, time: float) -> bool:
+        """Whether enough was seen of somebody to say for good that he is the target."""
+        assert self.person is not None
+        alike = stranger.resemblance(self.person.number)
+        if alike is None or stranger.sightings < RECOGNISED_SIGHTINGS:
+            return False
+        return time - stranger.first_seen >= RECOGNISED_AFTER and alike > RECOGNISED_ODDS
+
+    def _glance(
+        self,
+        frame: Frame,
+        scene: Scene | None,
+        view: DepthView | None,
+        dt: float,
+        surface: BySurface,
+    ) -> Track:
+        """Where depth shows nothing of the target, see whether its look is where it should be."""
+        if self._look is not None and view is not None:
+            box = surface.expected_box(view)
+            blind = scene is None or surface.without_depth(scene) > BLIND
+            if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
+                look = self._look.glance(frame, box, dt)
+                if look is not None:
+                    surface.seen_elsewhere(view, look.box)
+                    return self._tracked(frame, look.box, _score(look), look.depth)
+        surface.miss(scene, dt)
+        return self._hidden(dt)
+
+    # -- by look ----------------------------------------------------------------------------------
+
+    def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
+        assert self._look is not None
+        self._follow_size(frame)
+        look = self._look.step(frame, dt)
+        if look is not None and account is not None:
+            # Depth shows no such thing: a look that has become unlike is something else.
+            unlike = look.ratio < self._parameters.seen_ratio
+            if unlike or self._stands(account, look.box):
+                self._look.refuse()
+                look = None
+        if look is not None:
+            self._last_box, self._unseen = look.box, 0.0
+        else:
+            self._unseen += dt
+        if account is not None and self._unseen < NEWCOMER and self._agree(account, look):
+            assert self._surface is not None
+            assert self.seen is not None
+            box = outline_box(account.scene, self.seen)
+            return self._tracked(frame, box, NEW_SCORE, self.seen.depth)
+        if look is None:
+            return self._hidden(dt)
+        return self._tracked(frame, look.box, _score(look), look.depth)
+
+    def _follow_size(self, frame: Frame) -> None:
+        """Carry the last box over to a stream whose image size has changed."""
+        width, height = self._size_of_image
+        if (frame.width, frame.height) != (width, height):
+            across, down, b = frame.width / width, frame.height / height, self._last_box
+            self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
+            self._size_of_image = frame.width, frame.height
+
+    def _stands(self, account: Account, box: Box) -> bool:
+        """Whether a target that can move by itself would be what has always stood there."""
+        return self._mobile and _room_share(account, box) > STANDING
+
+    def _agree(self, account: Account, look: Look | None) -> bool:
+        """Go over to the surface once one has borne out the look, or somebody new is there."""
+        for column, sight in enumerate(account.sights):
+            row = account.owner[column]
+            if row >= 0 and account.people[row].first_seen <= self._since:
+                continue
+            outline = BySurface.outline(account.scene, sight.figure.seen)
+            common = outline.intersection(self._last_box)
+            if common > COVERED * outline.area and sight.figure.seen.area > NEWCOMER_AREA:
+                self._lock(account, outline)
+                return self._surface is not None
+        if look is None:
+            self._agreed = 0
+            return False
+        seen = BySurface.surface_of(account, look.box)
+        if seen is not None and BySurface.outline(account.scene, seen).iou(look.box) > RELOCK_IOU:
+            self._agreed += 1
+            if self._agreed >= RELOCK_FRAMES:
+                self._lock(account, look.box)
+                return self._surface is not None
+        else:
+            self._agreed = 0
+        return False
+
+    # -- answers ----------------------------------------------------------------------------------
+
+    def _hidden(self, dt: float) -> Track:
+        lost = self._hidden_for + dt > self._parameters.lost_after
+        state = TrackState.LOST if lost else TrackState.OCCLUDED
+        if self._surface is None:
+            return Track(None, state)
+        belief = self._surface.belief()
+        return Track(None, state, covariance=belief.covariance, predicted=belief.position)
+
+    def _tracked(self, frame: Frame, box: Box, score: float, depth: float | None) -> Track:
+        position = velocity = covariance = None
+        if depth is not None and frame.intrinsics is not None:
+            position = frame.intrinsics.deproject(box.cx, box.cy, depth)
+            if self._surface is not None:
+                belief = self._surface.belief()
+                velocity, covariance = belief.velocity, belief.covariance
+        return Track(
+            box,
+            TrackState.TRACKING,
+            score,
+            depth,
+            position,
+            velocity=velocity,
+            covariance=covariance,
+        )
+
+
+def _score(look: Look) -> float:
+    """Probability that a box found by look is right, from the response against its mean."""
+    return float(min(max(look.ratio, 0.0), SUREST_LOOK))
+
+
+def _room_share(account: Account, box: Box) -> float:
+    """Share of the middle of a box that shows the room."""
+    scene = account.scene
+    rows, cols = scene.view.shape
+    middle = box.scaled(0.6)
+    step = scene.view.step
+    x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
+    y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
+    part = scene.view.depth[y0:y1, x0:x1] > 0
+    part &= ~scene.before[y0:y1, x0:x1]
+    return float(part.mean()) if part.size else 0.0

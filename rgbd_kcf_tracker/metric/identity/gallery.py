@@ -1,0 +1,310 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How somebody looks, remembered as a few views, and the probability that two sightings are one.
+
+A view is a colour histogram in CIE Lab for each slice of the body, counted in metres down from the
+top of the head, so that it does not change with distance (colour in height slices is the common
+root of the hand-made descriptors, as of Lisanti et al., "Person re-identification by iterative
+re-weighted sparse ranking", 2015). Views are compared slice by slice by the Bhattacharyya
+coefficient, at the shift of lightness that fits best: the same shirt is brighter near the window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+FloatArray = npt.NDArray[np.float32]
+
+SLICES, SLICE = 9, 0.2
+"""Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
+LIGHTNESS, CHROMA = 10, 7
+"""Levels of lightness and of each chroma channel."""
+CHROMA_GAIN = 0.1
+"""Steepness of the chroma levels: clothes have little chroma, so they lie close about grey."""
+COLORFUL = 2.0
+"""By how much a colour weighs more with each level that it is away from grey: half of all people
+wear dark grey, so that it says little of who it is."""
+HEAD_WEIGHT = 0.3
+"""Weight of the first slice: hair and skin are much the same on all."""
+DIMMER = (0, 1, -1, 2, -2)
+DIMMER_COST = 0.01
+"""Shifts of lightness, in levels, at which two views are compared, and what each level costs."""
+LEAST_SLICE = 0.004
+"""Square metres of a slice from which its colours are compared."""
+LEAST_PIXELS = 30
+"""Pixels left of a silhouette without its rim, where colours are mixed with the background's."""
+
+STEEPNESS, EVEN, EVEN_PER_VIEW = 11.0, 0.62, 0.05
+"""Of the logistic curve from similarity to the log-odds of being the same person, where it is even
+for one view, and by how much more with each doubling of their number (the best of many is more
+alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
+SUREST_SAME, SUREST_OTHER = 3.5, -4.0
+"""Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
+ONE_SIDE, ALL_SIDES = 0.4, 4
+"""Share of :data:`SUREST_OTHER` that a single view can say, for there is another side to everybody;
+and the further views from which all sides are known."""
+WHOLE_AREA = 0.3
+"""Square metres of a view in which all of somebody shows; less of it tells less."""
+HEIGHT_SIGMA = 0.045
+"""Metres by which the height of one person's head differs between two sightings."""
+PEOPLE_HEIGHT, PEOPLE_SIGMA = 1.72, 0.11
+"""Metres of people's height (adults, both sexes)."""
+STOOPED = 0.25
+"""Share of sightings in which somebody does not stand upright."""
+
+_LEVEL = (np.arange(256) * LIGHTNESS // 256).astype(np.int32)
+_TINT = np.minimum(
+    CHROMA / 2 * (1 + np.tanh((np.arange(256) - 128.0) * CHROMA_GAIN)), CHROMA - 1
+).astype(np.int32)
+_FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(CHROMA) - CHROMA // 2] * 2, indexing='ij'))
+_COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
+_SLICE_WEIGHT = np.array([HEAD_WEIGHT] + [1.0] * (SLICES - 1), np.float32)
+_CODES = LIGHTNESS * CHROMA * CHROMA
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """One sighting of somebody's look.
+
+    Attributes:
+        roots: ``(SLICES, LIGHTNESS, CHROMA * CHROMA)`` float32, square roots of the weighted
+            histograms, each slice of length 1, or 0 where nothing of it shows.
+        area: ``(SLICES,)`` float32 square metres that show.
+        color: ``(SLICES,)`` float32, how colourful each slice is, at least 1.
+        top: metres above the floor of the head's top, None where it is hidden or no floor known.
+    """
+
+    roots: FloatArray
+    area: FloatArray
+    color: FloatArray
+    top: float | None
+
+    @classmethod
+    def of(
+        cls, view: DepthView, lab: npt.NDArray[np.uint8], seen: Silhouette, top: float | None
+    ) -> View:
+        """The look of a silhouette.
+
+        Args:
+            view: the depth that the silhouette is of.
+            lab: ``(h, w, 3)`` CIE Lab of the view.
+            seen: the silhouette.
+            top: metres above the floor of its top, or None.
+        """
+        mask = seen.mask.view(np.uint8)
+        inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=0)
+        mask = inner if np.count_nonzero(inner) >= LEAST_PIXELS else mask
+        down = (np.arange(len(mask), dtype=np.float32) + 0.5) * np.float32(
+            seen.depth / view.intrinsics.fy / SLICE
+        )
+        part = np.minimum(down.astype(np.int32), SLICES - 1)[:, None] * _CODES
+        crop = lab[seen.rows, seen.cols]
+        codes = (_LEVEL[crop[..., 0]] * CHROMA + _TINT[crop[..., 1]]) * CHROMA
+        codes += _TINT[crop[..., 2]]
+        codes += part
+        counts = np.bincount(codes[mask.view(np.bool_)], minlength=SLICES * _CODES)
+        cube = _smoothed(counts.reshape(SLICES, LIGHTNESS, CHROMA, CHROMA).astype(np.float32))
+        pixels = cube.reshape(SLICES, -1).sum(axis=1)
+        cube /= np.maximum(pixels, 1)[:, None, None, None]
+        roots = np.sqrt(cube)
+        roots *= _COLOR_WEIGHT
+        color = np.sqrt(np.square(roots).reshape(SLICES, -1).sum(axis=1))
+        roots /= np.maximum(color, 1e-6)[:, None, None, None]
+        k = view.intrinsics
+        area = pixels * np.float32(seen.depth**2 / (k.fx * k.fy))
+        return cls(
+            roots.reshape(SLICES, LIGHTNESS, -1),
+            area.astype(np.float32),
+            np.maximum(color, 1).astype(np.float32),
+            top,
+        )
+
+    @property
+    def total(self) -> float:
+        """Square metres that show."""
+        return float(self.area.sum())
+
+
+def _smoothed(cube: FloatArray) -> FloatArray:
+    """Each count shared with its neighbours along the last three axes: 1/4, 1/2, 1/4."""
+    for axis in (1, 2, 3):
+        moved = np.moveaxis(cube, axis, 0)
+        out = moved * np.float32(0.5)
+        out[1:] += np.float32(0.25) * moved[:-1]
+        out[:-1] += np.float32(0.25) * moved[1:]
+        out[0] += np.float32(0.25) * moved[0]
+        out[-1] += np.float32(0.25) * moved[-1]
+        cube = np.moveaxis(out, 0, axis)
+    return cube
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks:
+    """Several views stacked, for comparing one with all of them at once.
+
+    Attributes:
+        roots: ``(SLICES, n * LIGHTNESS, CHROMA * CHROMA)``.
+        area, color: ``(n, SLICES)``.
+    """
+
+    roots: FloatArray
+    area: FloatArray
+    color: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.area)
+
+    @classmethod
+    def of(cls, views: Sequence[View]) -> Looks:
+        """Stack at least one view."""
+        return cls(
+            np.concatenate([v.roots for v in views], axis=1),
+            np.stack([v.area for v in views]),
+            np.stack([v.color for v in views]),
+        )
+
+    @classmethod
+    def joined(cls, looks: Sequence[Looks]) -> Looks:
+        """Stack at least one stack."""
+        return cls(
+            np.concatenate([each.roots for each in looks], axis=1),
+            np.concatenate([each.area for each in looks]),
+            np.concatenate([each.color for each in looks]),
+        )
+
+
+def _diagonals() -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Where, in a flattened product of levels by levels, the diagonals lie and begin."""
+    cells = [
+        [level * LIGHTNESS + level + shift for level in range(LIGHTNESS)
+         if 0 <= level + shift < LIGHTNESS]
+        for shift in DIMMER
+    ]  # fmt: skip
+    starts = np.cumsum([0] + [len(each) for each in cells[:-1]])
+    return np.concatenate(cells).astype(np.intp), starts.astype(np.intp)
+
+
+_CELLS, _STARTS = _diagonals()
+_COST = (DIMMER_COST * np.abs(DIMMER)).astype(np.float32)
+
+
+def similarity(view: View, looks: Looks) -> FloatArray:
+    """How alike a view is to each of several, ``(n,)``, 0 to 1; 0 where no slice can be compared.
+
+    The mean over the slices that show in both, each counting by how much of it shows, how colourful
+    it is and :data:`HEAD_WEIGHT`, at the best of the shifts of lightness.
+    """
+    common = np.minimum(looks.area, view.area)
+    weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
+    weight[common < LEAST_SLICE] = 0
+    weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    # All levels of one against all of the other; the shifts are the diagonals of that.
+    cross = looks.roots @ view.roots.transpose(0, 2, 1)
+    cells = cross.reshape(SLICES, len(looks), LIGHTNESS * LIGHTNESS)[:, :, _CELLS]
+    alike = np.add.reduceat(cells, _STARTS, axis=2)
+    mean = np.einsum('ns,snd->nd', weight, alike) - _COST
+    best: FloatArray = np.maximum(mean.max(axis=1), 0)
+    return best
+
+
+def look_log_odds(alike: float, area: float, views: int = 1) -> float:
+    """Log-odds that a view is of the person, from its likeness to the most alike view of his.
+
+    Args:
+        alike: see :func:`similarity`.
+        area: square metres that show of the view, or of the largest that it was compared with,
+            whichever is less.
+        views: how many views of his it was compared with.
+    """
+    raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * np.log2(views))
+    share = 0.4 + 0.6 * min(1.0, area / WHOLE_AREA)
+    least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
+    return float(min(max(raw, least), SUREST_SAME)) * share
+
+
+def height_log_odds(top: float | None, known: float | None) -> float:
+    """Log-odds that a head's height above the floor is the person's rather than anybody's."""
+    if top is None or known is None:
+        return 0.0
+    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) + STOOPED
+    other = (1 - STOOPED) * _normal(top - PEOPLE_HEIGHT, PEOPLE_SIGMA) + STOOPED
+    return float(np.log(same / other))
+
+
+def _normal(x: float, sigma: float) -> float:
+    return float(np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi)))
+
+
+def same_person(first: View, second: View) -> float:
+    """Probability that two sightings show the same person, 0 to 1; 0.5 where they say nothing."""
+    alike = float(similarity(first, Looks.of([second]))[0])
+    odds = look_log_odds(alike, min(first.total, second.total))
+    odds += height_log_odds(first.top, second.top)
+    return float(1 / (1 + np.exp(-odds)))
+
+
+MOST_VIEWS = 14
+"""Views of one person: some sides, near and far, in some lights; more bring nothing and cost."""
+NOVEL = 0.9
+"""Likeness to the nearest view from which a new one adds nothing."""
+HEIGHT_MEMORY = 25
+
+
+class Gallery:
+    """The views by which one is known, and the height of the head."""
+
+    def __init__(self) -> None:
+        self.views: list[View] = []
+        self.looks: Looks | None = None
+        self._tops: list[float] = []
+
+    @property
+    def top(self) -> float | None:
+        """Median height of the head above the floor in metres, None where it is not known."""
+        return float(np.median(self._tops)) if self._tops else None
+
+    def log_odds(self, view: View, alike: float | None = None) -> float:
+        """Log-odds that a view is of the same person; 0 while the gallery is empty.
+
+        Args:
+            view: the view.
+            alike: its likeness to the most alike one of the gallery, where that is known.
+        """
+        odds = height_log_odds(view.top, self.top)
+        if self.looks is None:
+            return odds
+        if alike is None:
+            alike = float(similarity(view, self.looks).max())
+        area = min(view.total, max(each.total for each in self.views))
+        return odds + look_log_odds(alike, area, len(self.views))
+
+    def learn_height(self, top: float) -> None:
+        """Take a height of the head above the floor, in metres."""
+        self._tops = [*self._tops[1 - HEIGHT_MEMORY :], top]
+
+    def learn(self, view: View) -> None:
+        """Take a view that is surely of this person, where it shows something new."""
+        if self.looks is not None:
+            alike = similarity(view, self.looks)
+            if alike.max() > NOVEL:
+                return
+            if len(self.views) >= MOST_VIEWS:
+                # Of the two most alike the older goes, never the first, which is what was chosen.
+                self.views.pop(self._most_redundant())
+        self.views.append(view)
+        self.looks = Looks.of(self.views)
+
+    def _most_redundant(self) -> int:
+        assert self.looks is not None
+        likeness = np.stack([similarity(v, self.looks) for v in self.views])
+        np.fill_diagonal(likeness, 0)
+        return 1 + int(np.argmax(likeness[1:].max(axis=1)))

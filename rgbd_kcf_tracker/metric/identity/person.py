@@ -1,0 +1,128 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Somebody in view: where he is, how he moves, and how he looks."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+FloatArray = npt.NDArray[np.float64]
+
+PLACE_SIGMA = 0.18
+"""Metres by which the middle of a silhouette differs from the person's place."""
+WALKING = 1.0
+"""Metres a second by which a person's next place is unknown."""
+STEADY = 0.5
+"""Share of that for one who has been followed for some frames and was just seen."""
+COAST = 0.6
+"""Seconds for which a person goes on as before."""
+RECENT = 1.5
+"""Seconds between two sightings that tell a velocity."""
+ROOM_AREA = 16.0
+"""Square metres of floor that a camera sees: a stranger may be anywhere in it."""
+FORGET = 3.0
+"""Seconds after which two thirds of where somebody was is forgotten."""
+TRAVELLED = 0.5
+"""Metres that a thing which was moved, or the noise of one, does not travel."""
+ELSEWHERE = 0.02
+"""Probability that somebody just seen is anywhere by now (mistaken before, or hidden)."""
+
+
+class Person:
+    """One identity.
+
+    Args:
+        number: its id.
+        place: ``(2,)`` metres across and deep, see Figure.place.
+        time: seconds.
+        chosen: whether somebody asked to follow it.
+
+    Attributes:
+        seen_at: seconds, the last sight.
+        sightings: how often it was seen.
+        mobile: whether it was seen before a room that is known: what stands still is not it.
+        area: square metres, the most that was seen of it.
+        entered: whether it was first seen at the edge of what the camera sees.
+        last: the silhouette of the last sight, None where the camera has moved since.
+        upright: whether it ever had the shape of a person.
+        met: numbers of those who were seen at the same time, and so are surely somebody else.
+        travelled: metres, the farthest from where it was first seen.
+    """
+
+    def __init__(self, number: int, place: FloatArray, time: float, chosen: bool = False) -> None:
+        self.number, self.chosen = number, chosen
+        self.place, self.velocity = place.copy(), np.zeros(2)
+        self.first_place, self.travelled = place.copy(), 0.0
+        self.seen_at = self.first_seen = time
+        self.sightings = 1
+        self.upright = self.mobile = self.entered = False
+        self.met: set[int] = set()
+        self.last: Silhouette | None = None
+        self.area = 0.0
+        self._resembles: dict[int, tuple[float, int]] = {}
+        self.gallery = Gallery()
+
+    @property
+    def alive(self) -> bool:
+        """Whether this is surely somebody and not a thing that was moved or a door that opened."""
+        return self.chosen or self.upright or self.travelled > TRAVELLED
+
+    def expected(self, time: float) -> FloatArray:
+        """Where it is by now, ``(2,)`` metres."""
+        ahead: FloatArray = self.place + self.velocity * min(time - self.seen_at, COAST)
+        return ahead
+
+    def place_log_odds(self, places: FloatArray, time: float) -> FloatArray:
+        """Log-odds, ``(n,)``, of being at ``places`` ``(n, 2)`` rather than anybody else."""
+        gone = time - self.seen_at
+        away = np.square(places - self.expected(time)).sum(axis=1)
+        steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
+        variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
+        anywhere = max(ELSEWHERE, 1 - float(np.exp(-max(gone - 0.2, 0) / FORGET)))
+        density = np.exp(-0.5 * away / variance) / (2 * np.pi * variance)
+        odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
+        return odds
+
+    def resembled(self, other: int, odds: float) -> None:
+        """Take log-odds of a sighting of this one to look like another, who is not in view."""
+        total, count = self._resembles.get(other, (0.0, 0))
+        self._resembles[other] = total + odds, count + 1
+
+    def resemblance(self, other: int) -> float | None:
+        """Mean log-odds, over all sightings, of looking like another; None if never compared."""
+        total, count = self._resembles.get(other, (0.0, 0))
+        return total / count if count else None
+
+    def carried(self, motion: Pose, ahead: FloatArray) -> None:
+        """Keep the place in the world while the camera moves.
+
+        Args:
+            motion: the pose of the last camera's frame in that of now.
+            ahead: ``(3,)`` unit vector along the floor away from the camera.
+        """
+        across = np.array([1.0, 0.0, 0.0])
+        floor = np.stack((across, ahead))
+        self.last = None
+        turned = floor @ motion.rotation @ floor.T
+        shift = floor @ motion.translation
+        self.place = turned @ self.place + shift
+        self.first_place = turned @ self.first_place + shift
+        self.velocity = turned @ self.velocity
+
+    def moved_to(self, place: FloatArray, time: float) -> None:
+        """Take a sight of it at ``place``, ``(2,)`` metres."""
+        gone = time - self.seen_at
+        if 0 < gone < RECENT:
+            self.velocity = 0.5 * (self.velocity + (place - self.place) / gone)
+        elif gone > 0:
+            self.velocity = np.zeros(2)
+        self.place = place.copy()
+        self.seen_at = time
+        self.sightings += 1
+        self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))

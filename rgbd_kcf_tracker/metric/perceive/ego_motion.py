@@ -1,0 +1,162 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How the camera itself has moved from one view to the next, told from what stands still.
+
+Corners of the last image are found again in the next by optical flow (Lucas and Kanade 1981, in
+pyramids); their depth makes them points, and the motion is the one that projects these points to
+where they are found now: least squares over six numbers, by Gauss and Newton, with weights that
+leave out whoever walks (Cauchy's).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Intrinsics, Pose
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+
+FloatArray = npt.NDArray[np.float64]
+GrayImage = npt.NDArray[np.uint8]
+
+CHANGED = 14
+CHANGED_SHARE = 0.06
+"""Grey values by which a pixel must change to have changed, and the share of such pixels from which
+the camera may have moved; sensor noise stays below, and so does one person walking."""
+CORNERS = 90
+CORNER_QUALITY, CORNER_DISTANCE = 0.01, 6
+FLOW_WINDOW, FLOW_LEVELS = 11, 3
+"""Pixels of the window of the flow, and halvings: together they follow 40 pixels a frame."""
+LEAST_CORNERS = 12
+LEAST_AGREEING = 0.4
+"""Corners that must agree on a motion for it to be believed, and their share of all."""
+AGREE = 1.5
+"""Pixels of the view within which a corner agrees."""
+ITERATIONS = 8
+STILL, LEAST_STILL = 0.3, 0.35
+"""Pixels of flow up to which a corner stands still, and the share of them from which the camera
+does: somebody may have stepped before the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The camera has moved, and nothing tells how."""
+
+
+class EgoMotion:
+    """Tells the motion of one stream's camera."""
+
+    def __init__(self) -> None:
+        self._gray: GrayImage | None = None
+        self._view: DepthView | None = None
+
+    def update(
+        self, image: npt.NDArray[np.uint8], view: DepthView, others: npt.NDArray[np.bool_]
+    ) -> Pose | Lost | None:
+        """The motion since the last view: the pose of the last camera's frame in that of now.
+
+        Args:
+            image: ``(h, w, 3)`` BGR at the view's resolution.
+            view: the depth.
+            others: ``(h, w)`` bool, pixels of the last view that showed what may move by itself.
+
+        Returns:
+            None where the camera stands still.
+        """
+        gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        last, last_view = self._gray, self._view
+        self._gray, self._view = gray, view
+        if last is None or last_view is None or last.shape != gray.shape:
+            return None
+        change = cv2.absdiff(gray[::2, ::2], last[::2, ::2])
+        # A change of light changes all alike and is no motion.
+        change = cv2.absdiff(change, np.full_like(change, int(np.median(change))))
+        if np.count_nonzero(change > CHANGED) < CHANGED_SHARE * change.size:
+            return None
+        return _told(last, last_view, gray, others)
+
+
+def _told(
+    last: GrayImage, last_view: DepthView, gray: GrayImage, others: npt.NDArray[np.bool_]
+) -> Pose | Lost | None:
+    usable = (last_view.depth > 0) & ~others
+    corners = cv2.goodFeaturesToTrack(
+        last, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
+    )
+    if corners is None or len(corners) < LEAST_CORNERS:
+        return Lost()
+    window = (FLOW_WINDOW, FLOW_WINDOW)
+    found, status, _ = cv2.calcOpticalFlowPyrLK(
+        last, gray, corners, None, winSize=window, maxLevel=FLOW_LEVELS
+    )
+    good = status.reshape(-1) > 0
+    first = corners.reshape(-1, 2)[good].astype(np.float64)
+    second = found.reshape(-1, 2)[good].astype(np.float64)
+    if len(first) < LEAST_CORNERS:
+        return Lost()
+    still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
+    if still >= max(LEAST_CORNERS, LEAST_STILL * len(first)):
+        return None
+    k = last_view.intrinsics
+    z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
+    points = np.stack(((first[:, 0] - k.cx) * z / k.fx, (first[:, 1] - k.cy) * z / k.fy, z), axis=1)
+    motion = _fitted(points, second, k)
+    moved = motion.of(points)
+    ahead = np.maximum(moved[:, 2], 0.05)
+    miss = np.hypot(
+        moved[:, 0] * k.fx / ahead + k.cx - second[:, 0],
+        moved[:, 1] * k.fy / ahead + k.cy - second[:, 1],
+    )
+    agreeing = int(np.count_nonzero(miss < AGREE))
+    if agreeing < max(LEAST_CORNERS, LEAST_AGREEING * len(points)):
+        return Lost()
+    return motion
+
+
+def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics) -> Pose:
+    """The motion that projects points ``(n, 3)`` to pixels ``(n, 2)``."""
+    rotation, shift = np.eye(3), np.zeros(3)
+    scale = 4.0
+    for _ in range(ITERATIONS):
+        x, y, z = (points @ rotation.T + shift).T
+        z = np.maximum(z, 0.05)
+        error = np.stack((x * k.fx / z + k.cx, y * k.fy / z + k.cy), axis=1) - pixels
+        weight = 1 / (1 + np.square(error).sum(axis=1) / scale**2)
+        zero = np.zeros_like(z)
+        # Of the projection by a small turn (three) and shift (three) of the moved points.
+        du = np.stack(
+            (
+                -k.fx * x * y / z**2,
+                k.fx * (1 + x**2 / z**2),
+                -k.fx * y / z,
+                k.fx / z,
+                zero,
+                -k.fx * x / z**2,
+            ),
+            axis=1,
+        )
+        dv = np.stack(
+            (
+                -k.fy * (1 + y**2 / z**2),
+                k.fy * x * y / z**2,
+                k.fy * x / z,
+                zero,
+                k.fy / z,
+                -k.fy * y / z**2,
+            ),
+            axis=1,
+        )
+        jacobian = np.concatenate((du, dv))
+        weights = np.concatenate((weight, weight))
+        residual = np.concatenate((error[:, 0], error[:, 1]))
+        normal = (jacobian * weights[:, None]).T @ jacobian + 1e-6 * np.eye(6)
+        step = np.linalg.solve(normal, -(jacobian * weights[:, None]).T @ residual)
+        turn, _ = cv2.Rodrigues(step[:3])
+        rotation = turn @ rotation
+        shift = turn @ shift + step[3:]
+        scale = max(0.7, scale * 0.6)
+    return Pose(rotation, shift)

@@ -1,0 +1,64 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Taking the camera's own doing out of the colours: exposure, white balance, and a change of light.
+
+What stands still has the same colours as before; by how much they seem to have changed, each
+channel for itself (von Kries), is what has happened to all.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Image = npt.NDArray[np.uint8]
+
+DARKEST, BRIGHTEST = 12, 243
+"""Values between which a channel is neither noise nor saturated."""
+LEAST_PIXELS = 60
+"""Pixels of the room, at every fifth row and column, from which the light is told."""
+STRIDE = 5
+UNCHANGED = 0.02
+"""Gain up to which nothing is done."""
+LARGEST_GAIN = 8.0
+
+
+class Light:
+    """The light of a stream against that of its first frame.
+
+    Attributes:
+        gain: ``(3,)`` by which blue, green and red are multiplied.
+    """
+
+    def __init__(self) -> None:
+        self.gain = np.ones(3)
+        self._first: npt.NDArray[np.float32] | None = None
+
+    def restart(self) -> None:
+        """Forget what the room looked like, but not the light: the camera looks elsewhere."""
+        self._first = None
+
+    def steadied(self, image: Image, still: npt.NDArray[np.bool_]) -> Image:
+        """An image ``(h, w, 3)`` BGR in the light of the first.
+
+        Args:
+            image: of the view's size.
+            still: ``(h, w)`` bool, the pixels that show the room.
+        """
+        small = image[::STRIDE, ::STRIDE].astype(np.float32)
+        if self._first is None or self._first.shape != small.shape:
+            self._first = small * self.gain.astype(np.float32)
+        else:
+            low = np.minimum(small, self._first).min(axis=2)
+            high = np.maximum(small, self._first).max(axis=2)
+            usable = (low > DARKEST) & (high < BRIGHTEST) & still[::STRIDE, ::STRIDE]
+            if np.count_nonzero(usable) >= LEAST_PIXELS:
+                gain = np.median(self._first[usable] / small[usable], axis=0)
+                self.gain = np.clip(gain, 1 / LARGEST_GAIN, LARGEST_GAIN).astype(np.float64)
+        if np.abs(self.gain - 1).max() < UNCHANGED:
+            return image
+        table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)
+        result: Image = cv2.LUT(image, table[None])
+        return result

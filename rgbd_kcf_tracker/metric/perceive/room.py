@@ -1,0 +1,191 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What stands still: the farthest that was seen steadily along each pixel, and what is before it.
+
+Whatever is nearer than the room is somebody, or something that was moved. The room is learned while
+it is used: a place that turns out to be farther was hidden by somebody, and what comes to stand
+still and belongs to nobody becomes part of the room.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Intrinsics, Pose
+
+DepthArray = npt.NDArray[np.float32]
+Mask = npt.NDArray[np.bool_]
+
+NOISE = 0.08
+NOISE_PER_SQUARE_METRE = 0.012
+"""Metres by which readings of the same place differ: three deviations of a structured-light
+camera's noise, which grows with the square of depth (Khoshelham and Elberink 2012), and the shift
+of outlines between depth and colour."""
+BLIND_FRAMES = 3
+"""Frames without a reading after which a pixel is known to have none: a reading there is new."""
+NEAREST = 0.15
+"""Metres from the camera below which nothing is seen."""
+BLEND = 0.1
+"""Share of a new reading in the room's depth."""
+SETTLE = 3.0
+"""Seconds for which something that is nobody's must have stood still to become part of the room."""
+AGREEING = 0.5
+"""Share of readings where they were from which the camera stands where it stood."""
+LEAP, LEAP_PER_SECOND = 0.2, 1.5
+"""Metres by which the depth of a person goes up from one frame to the next at the most; where it
+goes up by more he has gone, and what shows is the room behind him."""
+
+
+def tolerance(depth: DepthArray) -> DepthArray:
+    """Metres by which a reading may differ from another of the same place, ``(h, w)``."""
+    allowed: DepthArray = np.square(depth)
+    allowed *= np.float32(NOISE_PER_SQUARE_METRE)
+    allowed += np.float32(NOISE)
+    return allowed
+
+
+def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
+    """A depth image as the moved camera sees it, ``(h, w)``, 0 where nothing is known."""
+    rows, cols = depth.shape
+    v, u = np.nonzero(depth)
+    z = depth[v, u]
+    points = np.stack(((u - k.cx) * z / k.fx, (v - k.cy) * z / k.fy, z), axis=1)
+    x, y, ahead = (points @ motion.rotation.T + motion.translation).astype(np.float32).T
+    inside = ahead > NEAREST
+    x, y, ahead = x[inside], y[inside], ahead[inside]
+    column = np.rint(x * np.float32(k.fx) / ahead + np.float32(k.cx)).astype(np.int32)
+    row = np.rint(y * np.float32(k.fy) / ahead + np.float32(k.cy)).astype(np.int32)
+    inside = (column >= 0) & (column < cols) & (row >= 0) & (row < rows)
+    place, ahead = row[inside] * cols + column[inside], ahead[inside]
+    # The nearest of those that fall on one pixel is written last.
+    order = np.argsort(-ahead)
+    seen = np.zeros(rows * cols, np.float32)
+    seen[place[order]] = ahead[order]
+    seen = seen.reshape(rows, cols)
+    # Where the view is spread, single pixels stay empty between two of the same surface.
+    beside = cv2.dilate(seen, np.ones((1, 3), np.uint8))
+    hole = (seen == 0) & (np.roll(seen, 1, 1) > 0) & (np.roll(seen, -1, 1) > 0)
+    hole[:, (0, -1)] = False
+    seen[hole] = beside[hole]
+    beside = cv2.dilate(seen, np.ones((3, 1), np.uint8))
+    hole = (seen == 0) & (np.roll(seen, 1, 0) > 0) & (np.roll(seen, -1, 0) > 0)
+    hole[(0, -1), :] = False
+    seen[hole] = beside[hole]
+    return seen
+
+
+class Room:
+    """The room as one view sees it.
+
+    Attributes:
+        depth: ``(h, w)`` float32 metres of the room, 0 where it is not known.
+        before: ``(h, w)`` bool, the pixels of the last frame that show something before the room.
+    """
+
+    def __init__(self) -> None:
+        self.depth: DepthArray = np.zeros((0, 0), np.float32)
+        self.before: Mask = np.zeros((0, 0), np.bool_)
+        self._farther: DepthArray = self.depth
+        self._front: DepthArray = self.depth
+        self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
+        self._still: DepthArray = self.depth
+        self._still_for: DepthArray = self.depth
+
+    def restart(self, depth: DepthArray, somebody: Mask) -> None:
+        """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
+        self.depth = np.where(somebody, np.float32(0), depth)
+        self.before = somebody & (depth > 0)
+        self._farther = np.zeros_like(depth)
+        self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
+        self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
+        self._front = np.where(somebody, depth, np.float32(0))
+
+    def open(self, somebody: Mask, depth: DepthArray) -> None:
+        """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
+        self.depth[somebody] = 0
+        self._blind[somebody] = BLIND_FRAMES
+        self._front[somebody] = depth[somebody]
+        self.before |= somebody & (depth > 0)
+
+    def agrees(self, depth: DepthArray) -> bool:
+        """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
+        if depth.shape != self.depth.shape:
+            return False
+        both = (depth > 0) & (self.depth > 0)
+        same = np.abs(depth - self.depth)[both] <= 0.5 * tolerance(depth)[both]
+        return bool(same.size and same.mean() > AGREEING)
+
+    def moved(self, motion: Pose, k: Intrinsics) -> Mask:
+        """See the room from where the camera is now.
+
+        Args:
+            motion: the pose of the last camera's frame in that of now.
+            k: of the view.
+
+        Returns:
+            ``(h, w)`` bool, the pixels of which nothing is known any more.
+        """
+        front = np.where((self.depth == 0) & (self._blind >= BLIND_FRAMES), self._front, 0)
+        self.depth = _seen_from(self.depth, motion, k)
+        self._front = _seen_from(front.astype(np.float32), motion, k)
+        unknown = self.depth == 0
+        opened = unknown & (self._front > 0)
+        self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
+        self._farther = np.zeros_like(self.depth)
+        self._still_for = np.zeros_like(self.depth)
+        lost: Mask = unknown & ~opened
+        return lost
+
+    def update(self, depth: DepthArray, dt: float, somebody: Mask | None) -> None:
+        """Compare the next view with the room and learn from it.
+
+        Args:
+            depth: ``(h, w)`` metres, 0 where there is no reading; of the size of the first.
+            dt: seconds since the last.
+            somebody: ``(h, w)`` bool, pixels that belonged to somebody in the last view, who may
+                stand still for as long as he likes; None for nobody.
+        """
+        valid = depth > 0
+        known = self.depth > 0
+        allowed = tolerance(depth)
+        nearer = self.depth - depth
+        both = valid & known
+        before = both & (nearer > allowed)
+        open_ = valid & ~known & (self._blind >= BLIND_FRAMES)
+        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + allowed
+        left = open_ & (self._front > 0) & (depth > self._front + leap)
+        open_ &= ~left
+        before |= open_
+        # Who passes before somebody does not take his place.
+        np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
+        farther = both & (nearer < -allowed)
+        again = farther & (np.abs(depth - self._farther) <= allowed)
+        same = both & ~before & ~farther
+        self.depth[same] -= np.float32(BLEND) * nearer[same]
+        self.depth[again] = depth[again]
+        self._farther = np.where(farther, depth, np.float32(0))
+        self._blind[left] = 0
+        unknown = ~known
+        fresh = unknown & valid & ~before
+        self.depth[fresh] = depth[fresh]
+        unknown &= ~valid
+        self._blind[unknown] = np.minimum(self._blind[unknown], 250) + 1
+        self.before = before
+        self._settle(depth, dt, allowed, somebody)
+
+    def _settle(
+        self, depth: DepthArray, dt: float, allowed: DepthArray, somebody: Mask | None
+    ) -> None:
+        still = self.before & (np.abs(depth - self._still) <= np.float32(0.5) * allowed)
+        if somebody is not None:
+            still &= ~somebody
+        self._still = np.where(self.before & ~still, depth, self._still)
+        self._still_for += np.float32(dt)
+        self._still_for *= still
+        settled = self._still_for > SETTLE
+        if settled.any():
+            self.depth[settled] = depth[settled]
+            self.before &= ~settled

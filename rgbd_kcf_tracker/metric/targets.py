@@ -1,0 +1,207 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The default tracker: the thesis's ideas carried out in metres, for one target or several.
+
+A frame is perceived once for all (:mod:`~rgbd_kcf_tracker.metric.perceive.scene`): depth cuts it
+into surfaces, and what stands before the room is somebody. Everyone is accounted for together
+(:mod:`~rgbd_kcf_tracker.metric.decide.crowd`), so that what belongs to one cannot be claimed by
+another; then each chosen target is followed with care (:mod:`~rgbd_kcf_tracker.metric.follower`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.by_surface import Candidate
+from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
+from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.follower import Follower
+from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.track import Track, TrackState, require_inside
+
+SHORTEST_STEP = 1e-3
+LONGEST_STEP = 5.0
+"""Seconds between two frames; stamps that stand still or jump are taken as these."""
+
+
+class MetricTargets:
+    """Follows the targets that were chosen, and, where asked to, everyone else.
+
+    Args:
+        parameters: see :class:`MetricParameters`.
+
+    Attributes:
+        everyone: whether people whom nobody chose get tracks too.
+        account: how the last frame was explained; None where it had no depth.
+    """
+
+    def __init__(self, parameters: MetricParameters) -> None:
+        p = self._parameters = parameters
+        self.everyone = False
+        self.account: Account | None = None
+        self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin, p.seed)
+        self._crowd = Crowd()
+        self._followers: dict[int, Follower] = {}
+        self._names: dict[int, int] = {}
+        self._next = 1
+        self._stamp_ns: int | None = None
+        self._time = 0.0
+        self._frame: Frame | None = None
+
+    def __len__(self) -> int:
+        return len(self._followers)
+
+    def add(self, frame: Frame, box: Box) -> int:
+        """Follow what is in ``box`` of ``frame``, the last that was given or the next.
+
+        Returns:
+            Its id, which is kept as long as the set lives.
+
+        Raises:
+            BoxError: where no whole pixel of the box lies inside the frame.
+        """
+        require_inside(box, frame)
+        if self._frame is not frame:
+            self._perceive(frame)
+            self._learn()
+        follower = Follower(frame, self.account, self._crowd, box, self._parameters)
+        number = self._name(follower.person)
+        self._followers[number] = follower
+        return number
+
+    def remove(self, number: int) -> None:
+        """No longer follow the target of that id.
+
+        Raises:
+            KeyError: where there is none.
+        """
+        follower = self._followers.pop(number)
+        if follower.person is not None:
+            follower.person.chosen = False
+
+    def update(self, frame: Frame) -> dict[int, Track]:
+        """The tracks of the next frame by id. Never raises for what the picture shows."""
+        if not self._followers and not self.everyone:
+            self._frame = None
+            return {}
+        dt = self._perceive(frame)
+        tracks = {
+            number: dataclasses.replace(
+                follower.step(frame, self.account, self._reader.last_view, dt), id=number
+            )
+            for number, follower in self._followers.items()
+        }
+        self._learn()
+        if self.everyone:
+            tracks.update(self._others(frame))
+        return tracks
+
+    def weighed(self, number: int) -> list[tuple[Candidate, Box]]:
+        """What was weighed for a target in the last frame, see :meth:`Follower.weighed`."""
+        return self._followers[number].weighed()
+
+    def started(self, number: int) -> Track:
+        """The last track of a target: after :meth:`add`, that of its first frame."""
+        return dataclasses.replace(self._followers[number].track, id=number)
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _perceive(self, frame: Frame) -> float:
+        dt = 0.0
+        if self._stamp_ns is not None:
+            dt = (frame.stamp_ns - self._stamp_ns) * 1e-9
+            dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
+        self._stamp_ns = frame.stamp_ns
+        self._time += dt
+        self._frame = frame
+        scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
+        self.account = None if scene is None else self._crowd.explain(scene, self._time)
+        return dt
+
+    def _learn(self) -> None:
+        if self.account is None:
+            return
+        targets = {
+            f.person.number: f.seen for f in self._followers.values() if f.person is not None
+        }
+        self._crowd.learn(self.account, targets)
+        self._reader.somebody = self.account.somebody()
+
+    def _name(self, person: Person | None) -> int:
+        """The id of a person, or a new one."""
+        if person is not None and person.number in self._names:
+            return self._names[person.number]
+        name = self._next
+        self._next += 1
+        if person is not None:
+            self._names[person.number] = name
+        return name
+
+    def _others(self, frame: Frame) -> dict[int, Track]:
+        """Tracks of those whom nobody chose, as far as they are in view or were a moment ago."""
+        tracks: dict[int, Track] = {}
+        account = self.account
+        if account is None:
+            return tracks
+        chosen = {f.person.number for f in self._followers.values() if f.person is not None}
+        for column, row in enumerate(account.owner):
+            if row < 0:
+                continue
+            person = account.people[row]
+            if person.number in chosen or not person.alive:
+                continue
+            seen = account.sights[column].figure.seen
+            box = outline_box(account.scene, seen)
+            position = None
+            if frame.intrinsics is not None:
+                position = frame.intrinsics.deproject(box.cx, box.cy, seen.depth)
+            tracks[self._name(person)] = Track(
+                box,
+                TrackState.TRACKING,
+                account.probability(row, column),
+                seen.depth,
+                position,
+                id=self._name(person),
+            )
+        for person in account.people:
+            gone = account.time - person.seen_at
+            if person.number in self._names and person.number not in chosen and gone > 0:
+                name = self._names[person.number]
+                if gone < self._parameters.lost_after and name not in tracks:
+                    tracks[name] = Track(None, TrackState.OCCLUDED, id=name)
+        return tracks
+
+
+class MetricTracker:
+    """One target: the same as :class:`MetricTargets` with one.
+
+    Args:
+        parameters: see :class:`MetricParameters`.
+    """
+
+    def __init__(self, parameters: MetricParameters) -> None:
+        self._parameters = parameters
+        self._targets: MetricTargets | None = None
+        self._number = 0
+
+    def weighed(self) -> list[tuple[Candidate, Box]]:
+        """What was weighed in the last frame, see :meth:`Follower.weighed`."""
+        return [] if self._targets is None else self._targets.weighed(self._number)
+
+    def start(self, frame: Frame, box: Box) -> Track:
+        """See :meth:`~rgbd_kcf_tracker.track.Tracker.start`."""
+        require_inside(box, frame)
+        self._targets = MetricTargets(self._parameters)
+        self._number = self._targets.add(frame, box)
+        return self._targets.started(self._number)
+
+    def update(self, frame: Frame) -> Track:
+        """See :meth:`~rgbd_kcf_tracker.track.Tracker.update`."""
+        if self._targets is None:
+            return Track(None, TrackState.IDLE)
+        return self._targets.update(frame)[self._number]

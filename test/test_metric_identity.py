@@ -1,0 +1,366 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who is who: views and galleries, one person, and everyone explained together."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from people_rig import (
+    BLACK,
+    BLUE,
+    CAMERA,
+    COLS,
+    DARK_RED,
+    GREEN,
+    GREY,
+    RED,
+    WALL,
+    Someone,
+    images,
+    picture,
+)
+
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.identity.gallery import (
+    MOST_VIEWS,
+    SLICES,
+    SUREST_OTHER,
+    SUREST_SAME,
+    Gallery,
+    Looks,
+    View,
+    height_log_odds,
+    look_log_odds,
+    same_person,
+    similarity,
+)
+from rgbd_kcf_tracker.metric.identity.person import COAST, Person
+from rgbd_kcf_tracker.metric.perceive.color_bands import view_lab
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+
+# -- looks ----------------------------------------------------------------------------------------
+
+
+def look(
+    shirt, trousers=BLACK, z: float = 2.5, top: float | None = None, rows: float = 1.0
+) -> View:
+    """The view of somebody at ``z``; ``rows`` is the share from the top that is not hidden."""
+    color, depth = images([Someone(0.0, z, shirt, trousers)])
+    mask = depth < WALL
+    y, x = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    bottom = y[0] + round(rows * (y[-1] + 1 - y[0]))
+    crop = mask[y[0] : bottom, x[0] : x[-1] + 1]
+    view = DepthView(depth, 1, CAMERA)
+    seen = Silhouette.of(view, int(x[0]), int(y[0]), crop, 1, Rim())
+    return View.of(view, view_lab(color), seen, top)
+
+
+def alike(first: View, second: View) -> float:
+    return float(similarity(first, Looks.of([second]))[0])
+
+
+def test_a_view_is_wholly_like_itself_and_unlike_other_colours():
+    red = look(RED)
+    assert alike(red, red) == pytest.approx(1.0, abs=1e-5)
+    assert alike(red, look(GREEN, GREY)) < 0.4
+    assert same_person(red, red) > 0.9
+    assert same_person(red, look(GREEN, GREY)) < 0.2
+
+
+def test_a_view_does_not_depend_on_distance():
+    assert alike(look(RED, z=2.0), look(RED, z=4.0)) > 0.9
+    assert alike(look(RED, z=2.0), look(RED, z=4.0)) > alike(look(RED), look(BLUE)) + 0.2
+
+
+def test_the_same_shirt_in_the_shade_is_still_the_same():
+    red, shade, other = look(RED), look(DARK_RED), look(BLUE)
+    assert alike(red, shade) > alike(red, other) + 0.2
+    assert same_person(red, shade) > 0.5
+
+
+def test_parts_are_compared_with_the_same_parts():
+    whole, upper = look(RED, GREEN), look(RED, GREEN, rows=0.5)
+    assert upper.total < 0.7 * whole.total
+    assert alike(upper, whole) > 0.95
+    # The other way round: red trousers are no red shirt.
+    assert alike(look(RED, GREEN), look(GREEN, RED)) < 0.5
+
+
+def test_a_view_without_common_parts_says_nothing():
+    view = look(RED)
+    empty = View(np.zeros_like(view.roots), np.zeros_like(view.area), view.color, None)
+    assert alike(view, empty) == 0.0
+    assert view.roots.shape[0] == SLICES
+
+
+def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
+    odds = [look_log_odds(a, 1.0, 5) for a in np.linspace(0, 1, 21)]
+    assert odds == sorted(odds)
+    assert odds[0] == pytest.approx(SUREST_OTHER)
+    assert odds[-1] <= SUREST_SAME
+    # One view leaves another side open, and the best of many is more alike whosever they are.
+    assert look_log_odds(0.0, 1.0, 1) > SUREST_OTHER
+    assert look_log_odds(0.8, 1.0, 14) < look_log_odds(0.8, 1.0, 1)
+    assert abs(look_log_odds(0.9, 0.05)) < abs(look_log_odds(0.9, 0.5))
+
+
+def test_height_speaks_for_the_same_and_against_another():
+    assert height_log_odds(None, 1.7) == height_log_odds(1.7, None) == 0.0
+    assert height_log_odds(1.95, 1.95) > height_log_odds(1.72, 1.72) > 0
+    assert height_log_odds(1.55, 1.85) < -1
+    # Somebody may sit down, so that no height alone can refuse him.
+    assert height_log_odds(1.1, 1.85) > -4
+
+
+def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
+    gallery = Gallery()
+    assert gallery.log_odds(look(RED)) == 0.0
+    first = look(RED)
+    gallery.learn(first)
+    gallery.learn(look(RED))
+    assert len(gallery.views) == 1, 'the same view again adds nothing'
+    assert gallery.log_odds(look(GREEN, GREY)) < 0 < gallery.log_odds(look(RED))
+    gallery.learn(look(BLUE, GREY))
+    assert gallery.log_odds(look(BLUE, GREY)) > 0, 'the other side of the jacket'
+    hues = cv2.cvtColor(
+        np.array([[[12 * i, 220, 200] for i in range(15)]], np.uint8), cv2.COLOR_HSV2BGR
+    )[0]
+    for shirt in hues:
+        for trousers in (BLACK, tuple(int(c) for c in hues[7]), (200, 200, 200)):
+            gallery.learn(look(tuple(int(c) for c in shirt), trousers))
+    assert len(gallery.views) == MOST_VIEWS
+    assert gallery.views[0] is first
+    assert gallery.looks is not None
+    assert len(gallery.looks) == MOST_VIEWS
+
+
+def test_the_height_of_a_gallery_is_a_median_of_the_newest():
+    gallery = Gallery()
+    assert gallery.top is None
+    for top in [1.1, 1.1, *[1.8] * 40]:
+        gallery.learn_height(top)
+    assert gallery.top == pytest.approx(1.8)
+    for _ in range(40):
+        gallery.learn_height(1.5)
+    assert gallery.top == pytest.approx(1.5)
+
+
+# -- one person -----------------------------------------------------------------------------------
+
+
+def test_a_person_goes_on_as_before_for_a_moment():
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    for i in range(1, 30):
+        one.moved_to(np.array([0.1 * i, 3.0]), 0.1 * i)
+    assert one.velocity == pytest.approx([1.0, 0.0], abs=0.01)
+    assert one.expected(2.9 + 0.3) == pytest.approx([3.2, 3.0], abs=0.01)
+    assert one.expected(2.9 + 60) == pytest.approx([2.9 + COAST, 3.0], abs=0.01)
+    assert one.travelled == pytest.approx(2.9)
+
+
+def test_the_place_says_less_the_longer_somebody_is_away():
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    places = np.array([[0.1, 3.0], [2.5, 3.0]])
+    now, later, long_after = (one.place_log_odds(places, t) for t in (0.2, 2.0, 60.0))
+    assert now[0] > 2
+    assert now[1] < -3
+    assert now[0] - now[1] > later[0] - later[1] > long_after[0] - long_after[1]
+    assert long_after == pytest.approx([0.0, 0.0], abs=0.1)
+
+
+def test_a_thing_that_was_moved_is_nobody_until_it_walks_or_stands_upright():
+    thing = Person(1, np.array([0.0, 3.0]), 0.0)
+    thing.moved_to(np.array([0.1, 3.0]), 0.1)
+    assert not thing.alive
+    thing.moved_to(np.array([0.8, 3.0]), 1.0)
+    assert thing.alive
+    assert Person(2, np.zeros(2), 0.0, chosen=True).alive
+
+
+def test_a_person_stays_in_the_world_while_the_camera_turns():
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    one.moved_to(np.array([0.1, 3.0]), 0.1)
+    # The camera turns left by 90 degrees: what was ahead is now to the right.
+    rotation, _ = cv2.Rodrigues(np.array([0.0, np.pi / 2, 0.0]))
+    one.carried(Pose(rotation, np.zeros(3)), np.array([0.0, 0.0, 1.0]))
+    assert one.place == pytest.approx([3.0, -0.1], abs=1e-9)
+    assert one.first_place == pytest.approx([3.0, 0.0], abs=1e-9)
+    assert np.hypot(*one.velocity) == pytest.approx(0.5)
+    assert one.last is None
+
+
+def test_resemblance_is_the_mean_over_all_sightings():
+    one = Person(1, np.zeros(2), 0.0)
+    assert one.resemblance(7) is None
+    for odds in (3.0, -1.0, 1.0):
+        one.resembled(7, odds)
+    assert one.resemblance(7) == pytest.approx(1.0)
+
+
+# -- everyone together ----------------------------------------------------------------------------
+
+
+class Watched:
+    """A crowd before a camera that has seen the empty room."""
+
+    def __init__(self) -> None:
+        self.crowd = Crowd()
+        self.time = 0.0
+        self._reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+        for _ in range(6):
+            self.see()
+
+    def see(self, *people: Someone, dt: float = 0.1, targets=None) -> Account:
+        self.time += dt
+        scene = self._reader.read(picture(list(people), self.time), dt)
+        assert scene is not None
+        account = self.crowd.explain(scene, self.time)
+        self.crowd.learn(account, targets(account) if targets else {})
+        self._reader.somebody = account.somebody()
+        return account
+
+    def walk(self, first: float, last: float, z: float, shirt, trousers=BLACK) -> Person:
+        """Somebody walks across at 1 m/s; who he is taken for in the end."""
+        account = None
+        for x in np.arange(first, last, 0.1 if last > first else -0.1):
+            account = self.see(Someone(float(x), z, shirt, trousers))
+        assert account is not None
+        return who(account, 0)
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds / 0.5)):
+            self.see(dt=0.5)
+
+
+def who(account: Account, column: int) -> Person:
+    assert account.owner[column] >= 0
+    return account.people[account.owner[column]]
+
+
+def test_an_empty_room_holds_nobody():
+    watched = Watched()
+    watched.wait(3)
+    assert watched.crowd.people == []
+
+
+def test_an_identity_is_kept_from_frame_to_frame_and_after_an_absence():
+    watched = Watched()
+    first = watched.walk(-1.0, 1.0, 3.0, RED)
+    assert len(watched.crowd.people) == 1
+    assert first.mobile
+    assert first.alive
+    watched.wait(20)
+    back = watched.walk(1.0, -0.5, 2.5, RED)
+    assert back is first
+
+
+def test_a_stranger_is_not_taken_for_who_has_left():
+    watched = Watched()
+    first = watched.walk(-1.0, 1.0, 3.0, RED)
+    watched.wait(20)
+    other = watched.walk(-1.0, 1.0, 3.0, GREEN, GREY)
+    assert other is not first
+    assert other.number != first.number
+    watched.wait(20)
+    assert watched.walk(-1.0, 1.0, 3.0, RED) is first
+
+
+def test_two_who_change_places_keep_who_they_are():
+    watched = Watched()
+    left = right = None
+    for i in range(24):
+        x = -0.9 + 0.075 * i
+        account = watched.see(Someone(x, 2.5, RED), Someone(-x, 3.5, GREEN, GREY))
+        by_depth = sorted(
+            range(len(account.sights)), key=lambda c: account.sights[c].figure.place[1]
+        )
+        if len(by_depth) == 2 and left is None and i > 3:
+            left, right = (who(account, c) for c in by_depth)
+    assert left is not None
+    assert left is not right
+    assert who(account, by_depth[0]) is left
+    assert who(account, by_depth[1]) is right
+    assert right.number in left.met
+    assert left.number in right.met
+
+
+def test_two_who_were_seen_together_are_never_made_one():
+    for together in (True, False):
+        watched = Watched()
+        for i in range(8):
+            x = 0.05 * i
+            one = [Someone(x - 1.0, 3.0, RED)] if together or i < 4 else []
+            two = [Someone(x + 0.6, 3.0, RED)] if together or i >= 4 else []
+            account = watched.see(*one, *two)
+        chosen, other = watched.crowd.people[0], watched.crowd.people[-1]
+        if not together:
+            other = watched.crowd.welcome(np.array([1.0, 3.0]), watched.time)
+            account = watched.see(Someone(1.0, 3.0, RED))
+        column = max(range(len(account.sights)), key=lambda c: account.sights[c].figure.place[0])
+        account.owner[column] = account.people.index(other)
+        # What follows the target says that it is where the other one is.
+        watched.crowd.learn(account, {chosen.number: account.sights[column].figure.seen})
+        assert (other in watched.crowd.people) == together
+
+
+def test_a_chosen_one_comes_back_as_a_stranger_who_resembles_him():
+    watched = Watched()
+    chosen = watched.walk(-1.0, 0.6, 3.0, RED)
+    chosen.chosen = True
+
+    def hidden(account: Account):
+        return {chosen.number: None}
+
+    for _ in range(round(3 * REUNION / 0.5)):
+        watched.see(dt=0.5, targets=hidden)
+    for shirt, trousers, same in ((GREEN, GREY, False), (RED, BLACK, True)):
+        for i in range(6):
+            account = watched.see(Someone(-0.8 + 0.1 * i, 2.5, shirt, trousers), targets=hidden)
+        stranger = account.stranger(chosen, 0)
+        assert stranger is not None
+        assert stranger is not chosen
+        resemblance = stranger.resemblance(chosen.number)
+        assert resemblance is not None
+        assert (resemblance > 1) == same
+        watched.wait(3)
+
+
+def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
+    watched = Watched()
+    for i in range(10):
+        account = watched.see(
+            Someone(-0.9 + 0.05 * i, 3.0, RED), Someone(0.9 - 0.03 * i, 3.0, BLUE)
+        )
+    columns = sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
+    one = who(account, columns[0])
+    others = account.others(one)
+    mine, theirs = (account.sights[c].figure.seen for c in columns)
+    assert others[theirs.rows, theirs.cols][theirs.mask].all()
+    assert not others[mine.rows, mine.cols][mine.mask].any()
+    assert account.stranger(one, columns[1]) is None
+    claim, wrong = account.claim(one, mine), account.claim(one, theirs)
+    assert claim.mine > 0
+    assert claim.rival < claim.mine
+    assert wrong.rival > wrong.mine
+    assert account.probability(account.people.index(one), columns[0]) > 0.9
+    assert account.probability(account.people.index(one), columns[1]) < 0.1
+
+
+def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
+    crowd = Crowd()
+    chosen = crowd.welcome(np.zeros(2), 0.0, chosen=True)
+    walker = crowd.welcome(np.zeros(2), 0.5)
+    walker.travelled = 2.0
+    for i in range(3 * MOST_PEOPLE):
+        crowd.welcome(np.zeros(2), 1.0 + i)
+    assert len(crowd.people) == MOST_PEOPLE + 1
+    assert chosen in crowd.people
+    assert walker in crowd.people, 'things that were moved are forgotten before people'
+    numbers = [person.number for person in crowd.people]
+    assert len(set(numbers)) == len(numbers)

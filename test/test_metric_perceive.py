@@ -1,0 +1,359 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a frame shows: the room, the light, the camera's motion, people and figures."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from people_rig import BLUE, CAMERA, COLS, ROWS, WALL, Someone, images, picture, texture
+
+from rgbd_kcf_tracker import Box, Frame
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
+from rgbd_kcf_tracker.metric.perceive.figures import find_figures
+from rgbd_kcf_tracker.metric.perceive.light import Light
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room
+from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import upright
+
+NOBODY = np.zeros((ROWS, COLS), bool)
+NONE_EXPECTED = np.zeros((0, 2))
+THING = (slice(40, 100), slice(60, 90))
+
+
+def wall(z: float = WALL) -> np.ndarray:
+    return np.full((ROWS, COLS), z, np.float32)
+
+
+def with_thing(z: float = 2.0) -> np.ndarray:
+    depth = wall()
+    depth[THING] = z
+    return depth
+
+
+# -- the room -------------------------------------------------------------------------------------
+
+
+def known_room(depth: np.ndarray) -> Room:
+    room = Room()
+    room.restart(depth, NOBODY)
+    for _ in range(4):
+        room.update(depth, 0.1, None)
+    return room
+
+
+def test_what_comes_before_the_room_is_told_from_it():
+    room = known_room(wall())
+    room.update(with_thing(), 0.1, None)
+    assert room.before[THING].all()
+    assert room.before.sum() == 60 * 30
+    assert (room.depth == WALL).all()
+
+
+def test_a_farther_place_that_is_revealed_becomes_the_room_when_seen_twice():
+    room = known_room(with_thing())
+    room.update(wall(), 0.1, None)
+    assert room.depth[50, 70] == pytest.approx(2.0), 'one reading may be noise'
+    room.update(wall(), 0.1, None)
+    assert room.depth[THING] == pytest.approx(WALL)
+    room.update(with_thing(), 0.1, None)
+    assert room.before[THING].all(), 'and what comes back there is before it'
+
+
+def test_what_is_put_down_becomes_the_room_after_a_while_unless_it_is_somebody():
+    for somebody in (False, True):
+        room = known_room(wall())
+        claimed = NOBODY.copy()
+        claimed[THING] = somebody
+        for _ in range(int((SETTLE - 0.5) / 0.1)):
+            room.update(with_thing(), 0.1, claimed)
+        assert room.before[THING].all(), 'not yet'
+        for _ in range(15):
+            room.update(with_thing(), 0.1, claimed)
+        assert room.before[THING].all() == somebody
+
+
+def test_the_clock_of_what_is_put_down_is_the_stamp_not_the_frame():
+    room = known_room(wall())
+    for _ in range(5):
+        room.update(with_thing(), 1.0, None)
+    assert not room.before.any()
+
+
+def test_pixels_that_somebody_left_become_room():
+    claimed = NOBODY.copy()
+    claimed[THING] = True
+    room = Room()
+    room.restart(with_thing(), claimed)
+    assert room.before[THING].all()
+    room.update(with_thing(), 0.1, claimed)
+    assert room.before[THING].all(), 'he is not the room while he stands there'
+    room.update(wall(), 0.1, claimed)
+    assert not room.before.any()
+    room.update(wall(), 0.1, None)
+    assert room.depth[THING] == pytest.approx(WALL)
+
+
+def test_pixels_that_turn_out_to_be_somebody_are_taken_out_of_the_room():
+    room = known_room(with_thing())
+    claimed = NOBODY.copy()
+    claimed[THING] = True
+    room.open(claimed, with_thing())
+    room.update(with_thing(), 0.1, None)
+    assert room.before[THING].all()
+    assert room.before.sum() == 60 * 30
+
+
+def test_the_room_is_seen_from_where_the_camera_has_moved_to():
+    room = known_room(with_thing())
+    # The camera goes 0.1 m to the right: all moves to the left, at 2 m by 10 pixels, at 5 m by 4.
+    unknown = room.moved(Pose(np.eye(3), np.array([-0.1, 0.0, 0.0])), CAMERA)
+    depth = wall()
+    depth[40:100, 50:80] = 2.0
+    inner = np.s_[:, 5 : COLS - 10]
+    agreeing = (np.abs(room.depth - depth) < 0.05) | unknown
+    assert agreeing[inner].mean() > 0.99
+    assert unknown[:, -3:].all(), 'what comes into view is not known'
+    room.update(depth, 0.1, None)
+    assert room.before.mean() < 0.01
+
+
+def test_a_room_elsewhere_does_not_agree():
+    room = known_room(with_thing())
+    assert room.agrees(with_thing())
+    assert not room.agrees(wall(3.0))
+    assert not room.agrees(np.full((10, 10), 2.0, np.float32))
+
+
+# -- the light ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('gain', [(1.4, 1.4, 1.4), (0.6, 0.6, 0.6), (1.3, 1.0, 0.8)])
+def test_exposure_and_white_balance_are_undone(gain: tuple[float, float, float]):
+    image = texture(1)
+    light = Light()
+    still = ~NOBODY
+    assert light.steadied(image, still) is image
+    changed = np.clip(image * np.array(gain), 0, 255).astype(np.uint8)
+    back = light.steadied(changed, still)
+    assert light.gain == pytest.approx(1 / np.array(gain), rel=0.03)
+    unsaturated = changed.max(axis=2) < 250
+    assert np.abs(back.astype(int) - image)[unsaturated].mean() < 3
+    assert np.abs(changed.astype(int) - image)[unsaturated].mean() > 10
+
+
+def test_the_light_is_told_from_what_stands_still_alone():
+    image = texture(1)
+    light = Light()
+    light.steadied(image, ~NOBODY)
+    changed = image.copy()
+    changed[:, 40:] = BLUE
+    still = ~NOBODY
+    still[:, 40:] = False
+    assert light.steadied(changed, still) is changed
+    assert light.gain == pytest.approx(np.ones(3), abs=0.02)
+
+
+def test_the_light_is_kept_when_the_camera_looks_elsewhere():
+    light = Light()
+    light.steadied(texture(1), ~NOBODY)
+    light.steadied((texture(1) * 0.6).astype(np.uint8), ~NOBODY)
+    light.restart()
+    other = (texture(2) * 0.6).astype(np.uint8)
+    back = light.steadied(other, ~NOBODY)
+    assert np.abs(back.astype(int) - texture(2)).mean() < 4
+
+
+# -- the camera's own motion ----------------------------------------------------------------------
+
+
+def seen_by(motion: Pose, slope: float = 0.004) -> tuple[np.ndarray, DepthView]:
+    """A textured slanted wall as seen by a camera, ``motion`` the first camera's pose in its frame.
+
+    In the first camera's frame the wall is the plane ``z = 3 + a x``.
+    """
+    a = slope * CAMERA.fx
+    v, u = np.mgrid[0:ROWS, 0:COLS].astype(np.float64)
+    rays = np.stack(((u - CAMERA.cx) / CAMERA.fx, (v - CAMERA.cy) / CAMERA.fy, np.ones_like(u)), -1)
+    back = motion.inverse
+    turned = rays @ back.rotation.T
+    # z0 + s rz = 3 + a (x0 + s rx)
+    origin = back.translation
+    s = (3 + a * origin[0] - origin[2]) / (turned[..., 2] - a * turned[..., 0])
+    points = origin + turned * s[..., None]
+    wide = texture(3, (400, 600))
+    columns = (points[..., 0] * 60 + 300).astype(np.float32)
+    rows = (points[..., 1] * 60 + 200).astype(np.float32)
+    image = cv2.remap(wide, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    return image, DepthView(s.astype(np.float32), 1, CAMERA)
+
+
+def turned(x: float, y: float, z: float, *shift: float) -> Pose:
+    rotation, _ = cv2.Rodrigues(np.radians([x, y, z]))
+    return Pose(rotation, np.array(shift))
+
+
+STILL = Pose(np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    'motion',
+    [
+        turned(0, 4, 0, 0, 0, 0),
+        turned(1.5, 0, 1, 0, 0, 0),
+        turned(0, 0, 0, 0.12, 0.0, 0.0),
+        turned(0.5, -2, 0, 0.03, -0.02, -0.1),
+    ],
+)
+def test_the_cameras_motion_is_recovered(motion: Pose):
+    ego = EgoMotion()
+    assert ego.update(*seen_by(STILL), NOBODY) is None
+    found = ego.update(*seen_by(motion), NOBODY)
+    assert isinstance(found, Pose)
+    between = motion.after(found.inverse)
+    angle = np.degrees(np.linalg.norm(cv2.Rodrigues(between.rotation)[0]))
+    assert angle < 0.3
+    assert np.linalg.norm(found.of(np.array([0, 0, 3.0])) - motion.of(np.array([0, 0, 3.0]))) < 0.03
+
+
+def test_a_camera_that_stands_still_has_not_moved_whoever_walks():
+    ego = EgoMotion()
+    image, view = seen_by(STILL)
+    ego.update(image, view, NOBODY)
+    noisy = np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255)
+    assert ego.update(noisy.astype(np.uint8), view, NOBODY) is None
+    walked = image.copy()
+    walked[20:150, 60:130] = BLUE
+    assert ego.update(walked, view, NOBODY) is None
+
+
+def test_a_change_of_light_is_no_motion():
+    ego = EgoMotion()
+    image, view = seen_by(STILL)
+    ego.update(image, view, NOBODY)
+    assert (
+        ego.update(np.clip(image.astype(int) + 30, 0, 255).astype(np.uint8), view, NOBODY) is None
+    )
+
+
+def test_a_cut_to_something_else_is_said_to_be_lost():
+    ego = EgoMotion()
+    image, view = seen_by(STILL)
+    ego.update(image, view, NOBODY)
+    assert isinstance(ego.update(texture(9), view, NOBODY), Lost)
+    ego = EgoMotion()
+    ego.update(np.full_like(image, 40), view, NOBODY)
+    assert isinstance(ego.update(image, view, NOBODY), Lost), 'nothing to follow'
+
+
+def test_poses_that_are_given_are_taken_before_what_seems():
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader.read(picture([], 0.0, pose=STILL), 0.0)
+    # In the fixed frame the camera went 0.2 m ahead: what it saw comes 0.2 m nearer.
+    ahead = Pose(np.eye(3), np.array([0.0, 0.0, 0.2]))
+    scene = reader.read(picture([], 0.1, pose=ahead), 0.1)
+    assert scene is not None
+    assert isinstance(scene.motion, Pose)
+    assert scene.motion.of(np.array([0, 0, 3.0])) == pytest.approx([0, 0, 2.8])
+
+
+# -- people who have not moved yet ----------------------------------------------------------------
+
+
+def silhouette(depth: np.ndarray) -> Silhouette:
+    mask = depth < WALL
+    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    crop = mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+    view = DepthView(depth, 1, CAMERA)
+    return Silhouette.of(view, int(cols[0]), int(rows[0]), crop, 1, Rim())
+
+
+def test_head_and_shoulders_are_a_person_and_a_box_is_not():
+    _, depth = images([Someone(0.0, 3.0)])
+    assert upright(silhouette(depth), CAMERA, 1.6)
+    assert upright(silhouette(depth), CAMERA, None)
+    assert not upright(silhouette(depth), CAMERA, 0.5), 'no person ends at half a metre'
+    box = wall()
+    seen = Someone(0.0, 3.0).box
+    box[int(seen.y) : int(seen.bottom), int(seen.x) : int(seen.right)] = 3.0
+    assert not upright(silhouette(box), CAMERA, 1.6)
+
+
+def test_a_person_who_stands_in_the_first_frame_is_not_the_room():
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    one = Someone(0.0, 3.0)
+    scene = reader.read(picture([one], 0.0), 0.0)
+    assert scene is not None
+    middle = int(one.box.cy), int(one.box.cx)
+    assert scene.before[middle]
+    depth = wall()
+    depth[40:100, 20:80] = 3.0
+    thing = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(texture(0), depth, 0, CAMERA), 0.0)
+    assert thing is not None
+    assert not thing.before.any()
+
+
+# -- figures --------------------------------------------------------------------------------------
+
+
+def scene_of(people: list[Someone], change=lambda depth: depth) -> Scene:
+    """The scene of people who came into a room that is known."""
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    for i in range(4):
+        reader.read(picture([], 0.1 * i), 0.1)
+    color, depth = images(people)
+    scene = reader.read(Frame(color, change(depth), 400_000_000, CAMERA), 0.1)
+    assert scene is not None
+    return scene
+
+
+def outline(seen: Silhouette) -> Box:
+    return Box(seen.left, seen.top, seen.mask.shape[1], seen.mask.shape[0])
+
+
+def test_pieces_above_each_other_are_one_figure():
+    one = Someone(0.3, 3.0)
+
+    def seam(depth: np.ndarray) -> np.ndarray:
+        row = int(one.box.cy)
+        depth[row : row + 4] = np.nan
+        return depth
+
+    figures = find_figures(scene_of([one], seam), NONE_EXPECTED)
+    assert len(figures) == 1
+    assert outline(figures[0].seen).iou(one.box) > 0.9
+    assert not figures[0].parted
+    assert figures[0].place == pytest.approx([0.3, 3.0], abs=0.03)
+
+
+def test_pieces_at_other_depths_or_beside_are_other_figures():
+    people = [Someone(-0.8, 3.0), Someone(0.4, 3.0), Someone(0.6, 2.0)]
+    figures = find_figures(scene_of(people), NONE_EXPECTED)
+    assert len(figures) == 3
+    assert not any(figure.parted for figure in figures)
+
+
+@pytest.mark.parametrize('expected', [NONE_EXPECTED, np.array([[-0.25, 3.0], [0.25, 3.0]])])
+def test_two_people_who_touch_are_parted(expected: np.ndarray):
+    # Their trunks, 0.46 m wide, overlap by a pixel; their heads do not.
+    people = [Someone(-0.225, 3.0), Someone(0.225, 3.0)]
+    figures = find_figures(scene_of(people), expected)
+    assert len(figures) == 2
+    assert all(figure.parted for figure in figures)
+    found = sorted(figures, key=lambda figure: figure.place[0])
+    for figure, one in zip(found, people, strict=True):
+        assert outline(figure.seen).iou(one.box) > 0.85
+
+
+def test_what_is_too_small_for_anybody_is_no_figure():
+    def crumb(depth: np.ndarray) -> np.ndarray:
+        depth[80:90, 100:110] = 3.0
+        return depth
+
+    assert find_figures(scene_of([], crumb), NONE_EXPECTED) == []
+    assert find_figures(scene_of([]), NONE_EXPECTED) == []

@@ -1,0 +1,319 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Several targets: ids, comings and goings, and that one does not disturb another."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, picture
+
+from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
+from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
+from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.targets import TargetSet
+from rgbd_kcf_tracker.variants import default_parameters
+
+STEP = 0.1
+
+
+def left(i: int) -> Someone:
+    return Someone(-1.0 + 0.02 * i, 3.0, RED, BLACK)
+
+
+def right(i: int) -> Someone:
+    return Someone(1.1 - 0.02 * i, 3.2, GREEN, GREY)
+
+
+def both(i: int) -> Frame:
+    return picture([left(i), right(i)], STEP * i)
+
+
+def follow(targets: TargetSet, frames: range, scene=both) -> dict[int, list]:
+    tracks: dict[int, list] = {}
+    for i in frames:
+        for number, track in targets.update(scene(i)).items():
+            assert track.id == number
+            tracks.setdefault(number, []).append(track)
+    return tracks
+
+
+# -- ids ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('variant', ['metric', 'kcf'])
+def test_each_target_keeps_its_id_and_its_box(variant: str):
+    targets = TargetSet(variant)
+    assert len(targets) == 0
+    assert targets.update(both(0)) == {}
+    frame = both(1)
+    numbers = [targets.add(frame, one(1).box) for one in (left, right)]
+    assert len(set(numbers)) == len(targets) == 2
+    for number, one in zip(numbers, (left, right), strict=True):
+        assert targets.started(number).box == one(1).box
+        assert targets.started(number).id == number
+    tracks = follow(targets, range(2, 8))
+    assert set(tracks) == set(numbers)
+    for number, one in zip(numbers, (left, right), strict=True):
+        assert len(tracks[number]) == 6
+        assert tracks[number][-1].box.iou(one(7).box) > 0.6
+
+
+@pytest.mark.parametrize('variant', ['metric', 'kcf'])
+def test_a_removed_target_has_no_track_and_its_id_does_not_go_to_another(variant: str):
+    targets = TargetSet(variant)
+    frame = both(0)
+    first, second = targets.add(frame, left(0).box), targets.add(frame, right(0).box)
+    follow(targets, range(1, 4))
+    targets.remove(first)
+    assert len(targets) == 1
+    assert set(targets.update(both(4))) == {second}
+    with pytest.raises(KeyError):
+        targets.remove(first)
+    frame = both(5)
+    targets.update(frame)
+    third = targets.add(frame, Box(5, 5, 30, 30))
+    assert third not in (first, second)
+
+
+def test_a_target_may_be_added_at_any_time():
+    targets = TargetSet('metric')
+    first = targets.add(both(0), left(0).box)
+    follow(targets, range(1, 8))
+    frame = both(8)
+    targets.update(frame)
+    second = targets.add(frame, right(8).box)
+    tracks = follow(targets, range(9, 16))
+    assert set(tracks) == {first, second}
+    assert tracks[first][-1].box.iou(left(15).box) > 0.7
+    assert tracks[second][-1].box.iou(right(15).box) > 0.7
+
+
+def test_targets_that_do_not_meet_are_followed_as_each_alone():
+    frame = both(0)
+    together = TargetSet('metric')
+    numbers = [together.add(frame, one(0).box) for one in (left, right)]
+    tracks = follow(together, range(1, 15))
+    for number, one in zip(numbers, (left, right), strict=True):
+        alone = TargetSet('metric')
+        alone.add(frame, one(0).box)
+        (single,) = follow(alone, range(1, 15)).values()
+        assert [t.box for t in tracks[number]] == [t.box for t in single]
+
+
+def test_a_tracker_is_a_set_of_one():
+    targets, tracker = TargetSet('metric'), create_tracker('metric')
+    number = targets.add(both(0), left(0).box)
+    tracker.start(both(0), left(0).box)
+    for i in range(1, 10):
+        track = tracker.update(both(i))
+        assert dataclasses.replace(targets.update(both(i))[number], id=track.id) == track
+
+
+def test_refusals_say_what_to_do():
+    with pytest.raises(ParameterError, match='variant'):
+        TargetSet('nothing')
+    with pytest.raises(ParameterError):
+        TargetSet('metric', default_parameters('kcf'))
+    with pytest.raises(BoxError, match='outside'):
+        TargetSet('metric').add(both(0), Box(900, 10, 20, 20))
+    with pytest.raises(ParameterError, match='use metric'):
+        TargetSet('kcf').everyone = True
+    colour = TargetSet('kcf')
+    colour.everyone = False
+    assert not colour.everyone
+    assert colour.metric is None
+
+
+def test_a_point_chooses_what_is_seen_there():
+    targets = TargetSet('metric')
+    number = targets.add_point(both(0), left(0).box.cx, left(0).box.cy)
+    assert targets.started(number).box.iou(left(0).box) > 0.7
+    assert follow(targets, range(1, 6))[number][-1].box.iou(left(5).box) > 0.7
+    with pytest.raises(BoxError):
+        targets.add_point(Frame(both(0).color), 20, 20)
+
+
+# -- everyone -------------------------------------------------------------------------------------
+
+
+def comers(i: int) -> Frame:
+    """An empty room, then one comes, then another beside him; both leave, the second returns."""
+    people = []
+    if 5 <= i < 45:
+        people.append(Someone(-1.3 + 0.05 * (i - 5), 3.0, RED))
+    if 15 <= i < 45:
+        people.append(Someone(1.5 - 0.04 * (i - 15), 3.8, GREEN, GREY))
+    if i >= 80:
+        people.append(Someone(-1.2 + 0.08 * (i - 80), 3.0, GREEN, GREY))
+    return picture(people, STEP * i)
+
+
+def test_everyone_gets_an_id_without_being_chosen_and_it_comes_back():
+    targets = TargetSet('metric')
+    targets.everyone = True
+    history = [targets.update(comers(i)) for i in range(96)]
+    assert all(not tracks for tracks in history[:5])
+    seen = [{n for n, t in tracks.items() if t.box is not None} for tracks in history]
+    assert len(seen[12]) == 1
+    assert len(seen[30]) == 2
+    (first,) = seen[12]
+    assert first in seen[30]
+    (second,) = seen[30] - {first}
+    assert not seen[60]
+    assert seen[95] == {second}
+    track = history[30][first]
+    assert track.box.iou(Someone(-0.05, 3.0).box) > 0.7
+    assert track.position[2] == pytest.approx(3.0, abs=0.05)
+    assert len(targets) == 0, 'nobody was chosen'
+
+
+def test_a_chosen_target_is_not_told_twice():
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(30):
+        targets.update(comers(i))
+    frame = comers(30)
+    before = targets.update(frame)
+    one = Someone(-0.05, 3.0)
+    number = targets.add(frame, one.box)
+    assert number in before, 'who had an id already keeps it'
+    tracks = targets.update(comers(31))
+    assert set(tracks) == set(before)
+    boxes = [t.box for t in tracks.values() if t.box is not None]
+    assert boxes[0].iou(boxes[1]) < 0.1
+
+
+# -- while hidden ---------------------------------------------------------------------------------
+
+BOARD = Box(110, 0, 50, ROWS)
+
+
+def behind_board(i: int) -> Frame:
+    return picture([Someone(-0.9 + 0.05 * i, 3.0)], STEP * i, BOARD if i > 0 else None)
+
+
+def test_a_hidden_target_is_predicted_and_has_no_box():
+    tracker = create_tracker('metric')
+    tracker.start(behind_board(0), Someone(-0.9, 3.0).box)
+    hidden = []
+    for i in range(1, 24):
+        track = tracker.update(behind_board(i))
+        box = Someone(-0.9 + 0.05 * i, 3.0).box
+        if track.box is not None:
+            assert track.predicted is None
+            assert track.position is not None
+            assert len(track.covariance) == 9
+            assert len(track.velocity) == 3
+        if box.x > BOARD.x and box.right < BOARD.right:
+            hidden.append((i, track))
+    assert len(hidden) >= 4
+    for i, track in hidden:
+        assert track.state is TrackState.OCCLUDED
+        assert track.box is None
+        assert track.occluded
+        x, y, z = track.predicted
+        assert abs(x - (-0.9 + 0.05 * i)) < 0.5
+        assert y == pytest.approx(0.05, abs=0.3)
+        assert abs(z - 3.0) < 0.5
+        spread = np.array(track.covariance).reshape(3, 3)
+        assert (np.linalg.eigvalsh(spread) > 0).all()
+
+
+def test_a_walking_target_has_a_velocity():
+    tracker = create_tracker('metric')
+    tracker.start(both(0), left(0).box)
+    for i in range(1, 20):
+        track = tracker.update(both(i))
+    assert track.velocity == pytest.approx((0.2, 0.0, 0.0), abs=0.1)
+
+
+# -- another size of image ------------------------------------------------------------------------
+
+
+def resized(frame: Frame, factor: int, depth: bool) -> Frame:
+    """The frame at ``factor`` times its size, as after a change of the camera's mode."""
+    color = frame.color.repeat(factor, 0).repeat(factor, 1)
+    metres = frame.depth.repeat(factor, 0).repeat(factor, 1) if depth else None
+    return Frame(color, metres, frame.stamp_ns)
+
+
+@pytest.mark.parametrize('depth', [False, True])
+def test_a_target_is_kept_when_the_image_size_changes(depth: bool):
+    tracker = create_tracker('metric')
+    tracker.start(resized(both(0), 2, depth), _times(left(0).box, 2))
+    for i, factor in enumerate((2, 2, 1, 1, 3, 3, 2), start=1):
+        track = tracker.update(resized(both(i), factor, depth))
+        assert track.box is not None, f'{i}: lost at {factor} times the size'
+        assert track.box.iou(_times(left(i).box, factor)) > 0.6
+
+
+def _times(box: Box, factor: float) -> Box:
+    return Box(box.x * factor, box.y * factor, box.width * factor, box.height * factor)
+
+
+# -- poses ----------------------------------------------------------------------------------------
+
+QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+
+
+def test_a_pose_moves_points_and_its_inverse_moves_them_back():
+    pose = Pose(QUARTER, np.array([1.0, 2.0, 3.0]))
+    point = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    assert pose.of(point) == pytest.approx(np.array([[2.0, 2.0, 3.0], [1.0, 2.0, 2.0]]))
+    assert pose.inverse.of(pose.of(point)) == pytest.approx(point)
+    other = Pose(np.eye(3), np.array([0.0, 0.0, -1.0]))
+    assert pose.after(other).of(point) == pytest.approx(other.of(pose.of(point)))
+
+
+@pytest.mark.parametrize(
+    ('rotation', 'translation', 'says'),
+    [
+        (np.eye(3) * 2, np.zeros(3), 'no rotation'),
+        (np.diag([1.0, 1.0, -1.0]), np.zeros(3), 'no rotation'),
+        (np.eye(4), np.zeros(3), r'\(4, 4\)'),
+        (np.eye(3), np.zeros((3, 1)), r'\(3, 1\)'),
+        (np.full((3, 3), np.nan), np.zeros(3), 'not finite'),
+        (np.eye(3), np.array([0, np.inf, 0]), 'not finite'),
+    ],
+)
+def test_what_is_no_pose_is_refused(rotation: np.ndarray, translation: np.ndarray, says: str):
+    with pytest.raises(ParameterError, match=says):
+        Pose(rotation, translation)
+
+
+def test_a_frame_carries_its_pose_and_its_camera():
+    frame = both(0)
+    assert frame.pose is None
+    assert frame.camera == ''
+    pose = Pose(QUARTER, np.zeros(3))
+    there = dataclasses.replace(frame, pose=pose, camera='door')
+    assert there.pose is pose
+    assert there.camera == 'door'
+    with pytest.raises(ImageError):
+        dataclasses.replace(there, depth=np.zeros((3, 3), np.float32))
+
+
+def test_a_target_is_kept_in_the_world_by_the_poses_of_a_moving_camera():
+    """The camera makes a step to the side while the target is hidden: the prediction goes along."""
+    predicted = []
+    for step in (0.0, 0.3):
+        tracker = create_tracker('metric', MetricParameters())
+        still = Pose(np.eye(3), np.zeros(3))
+        moved = Pose(np.eye(3), np.array([step, 0.0, 0.0]))
+        one = Someone(0.1, 3.0)
+        for i in range(4):
+            frame = picture([one], STEP * i, pose=still)
+            track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+            assert track.box is not None
+        # All is covered by something near, so that nothing but the pose tells of the motion.
+        near = np.full((ROWS, COLS), 0.8, np.float32)
+        covered = Frame(np.full((ROWS, COLS, 3), 90, np.uint8), near, 400_000_000, CAMERA, moved)
+        track = tracker.update(covered)
+        assert track.box is None
+        predicted.append(track.predicted)
+    assert predicted[1][0] - predicted[0][0] == pytest.approx(-0.3, abs=0.1)
