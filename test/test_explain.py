@@ -70,7 +70,7 @@ def test_every_figure_of_the_thesis_is_there() -> None:
     asked = '2.1 2.2 2.3 2.4 2.5 2.9 2.10 2.11 2.12 2.13 2.14 2.15 2.16 4.2 4.3 4.4 4.5 4.8 4.9'
     assert numbers >= {*asked.split(), '4.10', '4.11', '5.1', '5.2', 'D.1'}
     assert {p.name for p in chapters()['metric'].pictures} == {
-        'surfaces', 'candidates', 'particles_above',
+        'surfaces', 'candidates', 'gallery', 'particles_above',
     }  # fmt: skip
 
 

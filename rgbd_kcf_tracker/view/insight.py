@@ -12,14 +12,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide import evidence
+from rgbd_kcf_tracker.metric.identity.gallery import (
+    CHROMA,
+    CHROMA_GAIN,
+    LIGHTNESS,
+    Gallery,
+    View,
+)
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.perceive.surfaces import cut
-from rgbd_kcf_tracker.metric.tracker import MetricTracker
+from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
 from rgbd_kcf_tracker.thesis.particle_filter import HEIGHT, WIDTH, X, Y
 from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfTracker
 from rgbd_kcf_tracker.track import Tracker
@@ -28,13 +36,15 @@ Array = npt.NDArray[Any]
 
 CUES = (
     ('place', (0, 1, 2)),
-    ('colour', (3, 4)),
-    ('seen beside it', (5, 6, 12, 13)),
-    ('size', (7, 8, 9, 14)),
-    ('time hidden', (10, 11)),
-    ('should be in sight', (15,)),
-    ('left the image', (16,)),
-    ('to begin with', (17,)),
+    ('look', (11, 12)),
+    ('who stands there', (13, 14)),
+    ('somebody else', (15, 16)),
+    ('stood still', (17, 18)),
+    ('size', (3, 4, 5, 8)),
+    ('time hidden', (6, 7)),
+    ('should be in sight', (9,)),
+    ('left the image', (10,)),
+    ('to begin with', (19,)),
 )
 """What the regression's inputs are about, by their places in it."""
 
@@ -69,6 +79,7 @@ class Insight:
         view_depth: ``(h, w)`` metres of the view, 0 for no reading.
         floor: ``(a, b, c)`` with ``1/z = a u + b v + c`` in pixels of the view; None where unknown.
         step: pixels of the image to one of the view.
+        gallery: of each view by which the target is known, ``(slices, 3)`` RGB from head to feet.
     """
 
     considered: tuple[Considered, ...] = ()
@@ -79,12 +90,23 @@ class Insight:
     view_depth: Array | None = None
     floor: tuple[float, float, float] | None = None
     step: int = 1
+    gallery: tuple[Array, ...] = ()
+
+
+COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
+    'surfaces': (cut,),
+    'particles': (HiddenCloud.step,),
+    'considered': (evidence.probability, evidence.Evidence.features),
+    'gallery': (View.of, Gallery.learn),
+}
+"""The functions of the engine that made what is shown."""
 
 
 def insight_of(tracker: Tracker) -> Insight:
     """What a tracker knows after its last frame; empty for those that keep nothing."""
     if isinstance(tracker, MetricTracker):
-        return _of_metric(tracker)
+        targets = tracker._targets
+        return Insight() if targets is None else of_metric(targets, tracker._number)
     if isinstance(tracker, RgbdPfTracker) and tracker._model is not None:
         states = tracker._particles.states
         middles = states[:, [X, Y]] + states[:, [WIDTH, HEIGHT]] / 2
@@ -92,20 +114,14 @@ def insight_of(tracker: Tracker) -> Insight:
     return Insight()
 
 
-COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
-    'surfaces': (cut,),
-    'particles': (HiddenCloud.step,),
-    'considered': (evidence.probability, evidence.Evidence.features),
-}
-"""The functions of the engine that made what is shown."""
-
-
-def _of_metric(tracker: MetricTracker) -> Insight:
-    scene, surface = tracker._scene, tracker._surface
-    if scene is None:
+def of_metric(targets: MetricTargets, number: int) -> Insight:
+    """What is known of one of several targets after the last frame."""
+    account, follower = targets.account, targets._followers[number]
+    if account is None:
         return Insight()
+    scene, surface, person = account.scene, follower._surface, follower.person
     considered = []
-    for candidate, box in tracker.weighed():
+    for candidate, box in follower.weighed():
         share = evidence.WEIGHTS * candidate.evidence.features()
         seen = candidate.seen
         mask = np.zeros(scene.view.shape, bool)
@@ -123,4 +139,33 @@ def _of_metric(tracker: MetricTracker) -> Insight:
         view_depth=scene.view.depth,
         floor=None if floor is None else (floor.a, floor.b, floor.c),
         step=scene.view.step,
+        gallery=() if person is None else tuple(map(colors_of, person.gallery.views)),
     )
+
+
+def colors_of(view: View) -> Array:
+    """The mean colour of each slice of somebody, from head to feet, as his gallery remembers it.
+
+    Returns:
+        ``(SLICES, 3)`` float RGB, 0 to 1; NaN where nothing of the slice shows.
+    """
+    share = np.square(view.roots, dtype=np.float64).reshape(len(view.roots), LIGHTNESS, -1)
+    level = (np.arange(LIGHTNESS) + 0.5) * 256 / LIGHTNESS
+    tint = 2 * (np.arange(CHROMA) + 0.5) / CHROMA - 1
+    value = 128 + np.arctanh(tint) / CHROMA_GAIN
+    total = share.sum(axis=(1, 2))
+    weight = np.where(total > 0, total, np.nan)
+    by_chroma = share.sum(axis=1).reshape(len(share), CHROMA, CHROMA)
+    lab = np.stack(
+        (
+            share.sum(axis=2) @ level / weight,
+            by_chroma.sum(axis=2) @ value / weight,
+            by_chroma.sum(axis=1) @ value / weight,
+        ),
+        axis=1,
+    )
+    whole = np.clip(np.nan_to_num(lab), 0, 255).astype(np.uint8)[None]
+    rgb = cv2.cvtColor(whole, cv2.COLOR_Lab2RGB)[0].astype(np.float64) / 255
+    rgb[np.isnan(lab[:, 0])] = np.nan
+    colors: Array = rgb
+    return colors

@@ -69,6 +69,8 @@ def metric_chapter(frames: Iterable[tuple[int, Frame]], box: Box, asked: int) ->
     missing = ''
     if at is not None and at[3].surfaces is not None:
         pictures += [_surfaces(at), _candidates(at)]
+        if at[3].gallery:
+            pictures.append(_gallery(at))
     else:
         missing = 'Without depth metric follows the look alone, of which nothing is drawn here. '
     if hidden is not None:
@@ -186,6 +188,33 @@ def _overlay(axes: Axes, mask: Array, step: int, color: str, frame: Frame) -> No
     )
     axes.set_xlim(-0.5, frame.width - 0.5)
     axes.set_ylim(frame.height - 0.5, -0.5)
+
+
+def _gallery(seen: _Seen) -> Picture:
+    number, frame, track, insight = seen
+    figure = plot_style.figure(9.5, 3.2)
+    axes = figure.subplots(1, 2, width_ratios=(1.7, 1))
+    show_image(axes[0], rgb(frame), f'frame {number}')
+    if track.box is not None:
+        draw_box(axes[0], track.box, SEEN)
+    slices = max(len(view) for view in insight.gallery)
+    stripes = np.stack([*insight.gallery], axis=1)
+    axes[1].set_facecolor(plot_style.NOTHING)
+    axes[1].imshow(np.ma.masked_invalid(stripes).filled(0.85), interpolation='nearest')
+    axes[1].set_xticks(range(len(insight.gallery)))
+    axes[1].set_yticks([-0.5, slices - 0.5], ['head', 'feet'])
+    axes[1].set_xlabel('view')
+    axes[1].set_title('mean colour of each slice', fontsize=9)
+    axes[1].set_aspect('auto')
+    return Picture(
+        '', 'gallery', 'The gallery by which it is known',
+        'Of each view that is remembered the body is cut into slices of equal height, and each '
+        'keeps how often every colour shows in it; drawn is the mean. A candidate is compared with '
+        'all of them, from head to feet, and the best one says how likely it is the same person.',
+        r's = \max_v \sum_k a_k \sum_u \sqrt{p_{k,u}\ q^v_{k,u}}',
+        tuple(map(name_of, COMPUTED_BY['gallery'])), plot_style.png(figure),
+        {'colors': stripes},
+    )  # fmt: skip
 
 
 def _from_above(seen: _Seen) -> Picture:
