@@ -28,6 +28,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.perceive.surfaces import cut
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
+from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.thesis.particle_filter import HEIGHT, WIDTH, X, Y
 from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfTracker
 from rgbd_kcf_tracker.track import Tracker
@@ -112,6 +113,13 @@ def insight_of(tracker: Tracker) -> Insight:
         middles = states[:, [X, Y]] + states[:, [WIDTH, HEIGHT]] / 2
         return Insight(particle_pixels=middles, weights=tracker._particles.weights.copy())
     return Insight()
+
+
+def insight_in(targets: TargetSet, number: int) -> Insight:
+    """What a set knows of one of its targets after the last frame."""
+    if targets.metric is not None:
+        return of_metric(targets.metric, number)
+    return insight_of(targets._trackers[number])
 
 
 def of_metric(targets: MetricTargets, number: int) -> Insight:

@@ -129,6 +129,14 @@ def _target(number: int, track: Track, name: str, insight: Insight | None) -> di
         'depth': None if track.depth is None else round(track.depth, 3),
         'position': None if track.position is None else [round(v, 3) for v in track.position],
     }
+    if track.velocity is not None:
+        target['speed'] = round(float(np.linalg.norm(track.velocity)), 2)
+    if track.predicted is not None:
+        target['predicted'] = [round(v, 3) for v in track.predicted]
+        if track.covariance is not None:
+            x, _, z = track.predicted
+            spread = np.array(track.covariance).reshape(3, 3)[::2, ::2]
+            target['ellipse'] = ellipse_of(np.array((x, z)), spread)
     if insight is None:
         return target
     target['considered'] = [
@@ -142,7 +150,7 @@ def _target(number: int, track: Track, name: str, insight: Insight | None) -> di
     hidden = track.state is not TrackState.TRACKING
     if insight.particles is not None and insight.weights is not None and hidden:
         target['particles'] = _particles(insight.particles, insight.weights)
-        target['ellipse'] = ellipse(insight.particles, insight.weights)
+        target.setdefault('ellipse', ellipse(insight.particles, insight.weights))
     if insight.particle_pixels is not None and insight.weights is not None:
         target['pixels'] = _particles(insight.particle_pixels, insight.weights, 1)
     return target
@@ -172,14 +180,19 @@ def _particles(places: npt.NDArray[Any], weights: npt.NDArray[Any], digits: int 
 
 
 def ellipse(particles: npt.NDArray[Any], weights: npt.NDArray[Any]) -> list[float]:
-    """The ellipse from above that holds 95 % of a normal spread: x, z, both half axes, angle.
-
-    Metres and radians, the angle from x towards z.
-    """
+    """The ellipse about particles from above, see :func:`ellipse_of`."""
     places = particles[:, [0, 2]]
     mean = weights @ places
     away = places - mean
     spread = (weights[:, None] * away).T @ away
+    return ellipse_of(mean, spread)
+
+
+def ellipse_of(mean: npt.NDArray[Any], spread: npt.NDArray[Any]) -> list[float]:
+    """The ellipse that holds 95 % of a normal spread: x, z, both half axes, angle.
+
+    Metres and radians, the angle from x towards z.
+    """
     values, vectors = np.linalg.eigh(spread)
     major, minor = (_HOLDS_95 * float(np.sqrt(max(v, 0.0))) for v in (values[1], values[0]))
     angle = float(np.arctan2(vectors[1, 1], vectors[0, 1]))

@@ -1,7 +1,10 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Several targets at once, each with an id that the page gives."""
+"""Several targets under the ids of the page, which outlive the set that follows them.
+
+When a parameter changes the run goes on with another set, but a target keeps its id and its name.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,17 @@ from collections.abc import Mapping
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.parameters import Parameters
-from rgbd_kcf_tracker.track import Track, Tracker
-from rgbd_kcf_tracker.variants import create_tracker, default_parameters
-from rgbd_kcf_tracker.view.insight import Insight, insight_of, of_metric
+from rgbd_kcf_tracker.targets import TargetSet
+from rgbd_kcf_tracker.track import Track
+from rgbd_kcf_tracker.view.insight import Insight, insight_in
 
 MOST = 16
 """Targets at once."""
 
 
 class Targets:
-    """Follows several: ``metric`` accounts for all together, of the others each by a tracker.
+    """A :class:`~rgbd_kcf_tracker.targets.TargetSet` with the ids of the page.
 
     Args:
         variant: of the trackers.
@@ -30,12 +31,7 @@ class Targets:
     """
 
     def __init__(self, variant: str, parameters: Parameters | None = None) -> None:
-        self._variant = variant
-        self._parameters = default_parameters(variant) if parameters is None else parameters
-        self._trackers: dict[int, Tracker] = {}
-        self._together: MetricTargets | None = None
-        if isinstance(self._parameters, MetricParameters):
-            self._together = MetricTargets(self._parameters)
+        self._set = TargetSet(variant, parameters)
         self._ids: dict[int, int] = {}
         """Of the page's ids those within the set; two may be one person."""
 
@@ -48,38 +44,26 @@ class Targets:
         """
         if len(self) >= MOST and number not in self:
             raise ParameterError(f'{MOST} targets are followed already: remove one first')
-        if self._together is not None:
-            inner = self._together.add(frame, box)
-            self._ids[number] = inner
-            return self._together.started(inner)
-        tracker = create_tracker(self._variant, self._parameters)
-        track = tracker.start(frame, box)
-        self._trackers[number] = tracker
-        return track
+        inner = self._ids[number] = self._set.add(frame, box)
+        return self._set.started(inner)
 
     def remove(self, number: int) -> None:
         """Follow it no more."""
-        self._trackers.pop(number, None)
         inner = self._ids.pop(number, None)
-        if self._together is not None and inner is not None and inner not in self._ids.values():
-            self._together.remove(inner)
+        if inner is not None and inner not in self._ids.values():
+            self._set.remove(inner)
 
     def update(self, frame: Frame) -> dict[int, Track]:
         """Where each target is in the next frame."""
-        if self._together is not None:
-            tracks = self._together.update(frame)
-            return {number: tracks[inner] for number, inner in self._ids.items()}
-        return {number: tracker.update(frame) for number, tracker in self._trackers.items()}
+        tracks = self._set.update(frame)
+        return {number: tracks[inner] for number, inner in self._ids.items()}
 
     def insights(self) -> Mapping[int, Insight]:
         """What is known of each after the last frame."""
-        together = self._together
-        if together is not None:
-            return {number: of_metric(together, inner) for number, inner in self._ids.items()}
-        return {number: insight_of(tracker) for number, tracker in self._trackers.items()}
+        return {number: insight_in(self._set, inner) for number, inner in self._ids.items()}
 
     def __len__(self) -> int:
-        return len(self._trackers) + len(self._ids)
+        return len(self._ids)
 
     def __contains__(self, number: int) -> bool:
-        return number in self._trackers or number in self._ids
+        return number in self._ids

@@ -146,6 +146,7 @@ function showTargets(shown) {
     const words = [{tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'idle'}[target.state]];
     if (target.box && target.score !== null) words.push(`score ${target.score.toFixed(2)}`);
     if (target.depth !== null) words.push(`${target.depth.toFixed(2)} m`);
+    if (target.speed !== undefined) words.push(`${target.speed.toFixed(1)} m/s`);
     facts.textContent = words.join(' · ');
     const views = item.children[4];
     const urls = page.views.get(target.id) || [];
