@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
     from rgbd_kcf_tracker.errors import RgbdKcfError
     from rgbd_kcf_tracker.frame import Frame
-    from rgbd_kcf_tracker.geometry import Box, Intrinsics, Pose
+    from rgbd_kcf_tracker.geometry import Box, Intrinsics
+    from rgbd_kcf_tracker.pose import Pose
     from rgbd_kcf_tracker.targets import TargetSet
     from rgbd_kcf_tracker.track import Track, Tracker, TrackState
     from rgbd_kcf_tracker.variants import create_tracker
@@ -34,7 +35,7 @@ _HOMES = {
     'Box': 'geometry',
     'Frame': 'frame',
     'Intrinsics': 'geometry',
-    'Pose': 'geometry',
+    'Pose': 'pose',
     'RgbdKcfError': 'errors',
     'TargetSet': 'targets',
     'Track': 'track',

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ImageError
-from rgbd_kcf_tracker.geometry import Intrinsics, Pose
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.pose import Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)

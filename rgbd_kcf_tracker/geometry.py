@@ -8,9 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 
 
@@ -148,50 +145,3 @@ class Intrinsics:
     def deproject(self, u: float, v: float, z: float) -> tuple[float, float, float]:
         """Point in metres of pixel ``u, v`` at depth ``z``."""
         return (u - self.cx) * z / self.fx, (v - self.cy) * z / self.fy, z
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pose:
-    """A frame's place in another: a point ``p`` of it is ``rotation @ p + translation`` there.
-
-    Attributes:
-        rotation: ``(3, 3)`` float64.
-        translation: ``(3,)`` float64 metres.
-
-    Raises:
-        ParameterError: where the numbers are not finite or the matrix is no rotation.
-    """
-
-    rotation: npt.NDArray[np.float64]
-    translation: npt.NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        rotation = np.array(self.rotation, np.float64)
-        translation = np.array(self.translation, np.float64)
-        if rotation.shape != (3, 3) or translation.shape != (3,):
-            raise ParameterError(
-                f'pose has a rotation {rotation.shape} and a translation {translation.shape}: '
-                'give (3, 3) and (3,)'
-            )
-        if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
-            raise ParameterError('pose has numbers that are not finite')
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-3 or np.linalg.det(rotation) < 0:
-            raise ParameterError('pose has a matrix that is no rotation: give an orthonormal one')
-        object.__setattr__(self, 'rotation', rotation)
-        object.__setattr__(self, 'translation', translation)
-
-    def after(self, other: Pose) -> Pose:
-        """This pose followed by another: of this frame in the one that ``other`` leads to."""
-        return Pose(
-            other.rotation @ self.rotation, other.rotation @ self.translation + other.translation
-        )
-
-    @property
-    def inverse(self) -> Pose:
-        """The other frame's place in this one."""
-        return Pose(self.rotation.T, -self.rotation.T @ self.translation)
-
-    def of(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Points of this frame in the other, ``(..., 3)`` metres."""
-        moved: npt.NDArray[np.float64] = points @ self.rotation.T + self.translation
-        return moved

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
-from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.pose import Pose
 
 CAMERA = Intrinsics(200.0, 200.0, 120.0, 80.0)
 ROWS, COLS = 160, 240

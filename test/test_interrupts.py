@@ -253,7 +253,7 @@ def test_results_are_kept_as_long_as_what_makes_them(
         ('evaluation/datasets/base.py', False),
         ('evaluation/passes.py', False),
         ('recordings/textfiles.py', False),
-        ('metric/tracker.py', False),
+        ('metric/targets.py', False),
         ('geometry.py', False),
         ('evaluation/plots.py', True),
         ('cli/track.py', True),

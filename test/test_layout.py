@@ -25,7 +25,7 @@ SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
 # not know of it, but for SIDEWAYS.
 LAYERS = (
     ('errors',),
-    ('extras', 'parameters', 'geometry'),
+    ('extras', 'parameters', 'geometry', 'pose'),
     ('frame',),
     ('track',),
     ('features',),

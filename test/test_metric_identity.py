@@ -23,7 +23,6 @@ from people_rig import (
     picture,
 )
 
-from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.identity.gallery import (
     MOST_VIEWS,
@@ -43,6 +42,7 @@ from rgbd_kcf_tracker.metric.perceive.color_bands import view_lab
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.pose import Pose
 
 # -- looks ----------------------------------------------------------------------------------------
 

@@ -11,7 +11,6 @@ import pytest
 from people_rig import BLUE, CAMERA, COLS, ROWS, WALL, Someone, images, picture, texture
 
 from rgbd_kcf_tracker import Box, Frame
-from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
@@ -20,6 +19,7 @@ from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import upright
+from rgbd_kcf_tracker.pose import Pose
 
 NOBODY = np.zeros((ROWS, COLS), bool)
 NONE_EXPECTED = np.zeros((0, 2))

@@ -13,8 +13,8 @@ from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, pic
 
 from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
-from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Box, Pose
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 

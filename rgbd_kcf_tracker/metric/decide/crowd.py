@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.identity.gallery import Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -19,6 +18,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import upright
+from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 

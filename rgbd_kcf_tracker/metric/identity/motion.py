@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 

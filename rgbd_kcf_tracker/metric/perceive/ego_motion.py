@@ -17,8 +17,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Intrinsics, Pose
+from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 GrayImage = npt.NDArray[np.uint8]

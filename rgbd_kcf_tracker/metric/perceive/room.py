@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Intrinsics, Pose
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.pose import Pose
 
 DepthArray = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Pose
 from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_image, view_lab
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
@@ -21,6 +20,7 @@ from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
 from rgbd_kcf_tracker.metric.perceive.upright import upright_people
+from rgbd_kcf_tracker.pose import Pose
 
 
 @dataclass(frozen=True, slots=True, eq=False)
