@@ -156,9 +156,7 @@ class BySurface:
         if not len(rows):
             return seen
         part = part[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        return Silhouette.of(
-            scene.view, x0 + int(cols[0]), y0 + int(rows[0]), part, 0, scene.rim
-        )
+        return Silhouette.of(scene.view, x0 + int(cols[0]), y0 + int(rows[0]), part, 0, scene.rim)
 
     # -- one frame --------------------------------------------------------------------------------
 
