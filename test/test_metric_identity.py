@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -23,7 +25,9 @@ from people_rig import (
     picture,
 )
 
+from rgbd_kcf_tracker import Box, create_tracker
 from rgbd_kcf_tracker.geometry import Pose
+from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.identity.gallery import (
     MOST_VIEWS,
@@ -364,3 +368,68 @@ def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
     assert walker in crowd.people, 'things that were moved are forgotten before people'
     numbers = [person.number for person in crowd.people]
     assert len(set(numbers)) == len(numbers)
+
+
+# -- the chosen one -------------------------------------------------------------------------------
+
+
+def test_surface_of_a_box_is_the_one_it_is_drawn_about():
+    watched = Watched()
+    left, right = Someone(-0.6, 3.0, RED), Someone(0.6, 3.0, BLUE)
+    account = watched.see(left, right)
+    for one in (left, right):
+        seen = BySurface.surface_of(account, one.box)
+        assert seen is not None
+        assert BySurface.outline(account.scene, seen).iou(one.box) > 0.9
+    assert BySurface.surface_of(account, Box(5, 5, 20, 20)) is None
+
+
+def test_what_sticks_out_of_the_given_box_is_not_the_target():
+    watched = Watched()
+    one = Someone(0.0, 3.0, RED)
+    account = watched.see(one)
+    upper = Box(one.box.x, one.box.y, one.box.width, 0.7 * one.box.height)
+    seen = BySurface.surface_of(account, upper)
+    assert seen is not None
+    assert BySurface.outline(account.scene, seen).iou(upper) > 0.85
+
+
+def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
+    """What follows from a step is a take, a miss, or a place told by the look: one of them."""
+    calls: list[str] = []
+
+    def watch(name: str) -> None:
+        call = getattr(BySurface, name)
+
+        def noted(*args, **more):
+            calls.append(name)
+            return call(*args, **more)
+
+        monkeypatch.setattr(BySurface, name, noted)
+
+    for name in ('step', 'take', 'miss', 'seen_elsewhere'):
+        watch(name)
+    tracker = create_tracker('metric')
+    board = Box(120, 0, 60, 160)
+    outcomes = set()
+    for i in range(36):
+        one = Someone(-0.9 + 0.05 * i, 3.0)
+        frame = picture([one], 0.1 * i, board if i > 12 else None)
+        if 6 <= i < 9:
+            rows = slice(int(one.box.y) - 2, int(one.box.bottom) + 2)
+            cols = slice(int(one.box.x) - 6, int(one.box.right) + 6)
+            blind = frame.depth.copy()
+            blind[rows, cols] = np.nan
+            frame = dataclasses.replace(frame, depth=blind)
+        if 10 <= i < 12:
+            frame = dataclasses.replace(frame, depth=None)
+        if i == 0:
+            tracker.start(frame, one.box)
+            continue
+        calls.clear()
+        tracker.update(frame)
+        after = [call for call in calls if call != 'step']
+        assert len(after) == 1, f'frame {i}: {calls}'
+        assert calls.index(after[0]) == len(calls) - 1
+        outcomes.update(after)
+    assert outcomes == {'take', 'miss', 'seen_elsewhere'}
