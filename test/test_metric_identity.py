@@ -150,7 +150,7 @@ def test_the_height_of_a_gallery_is_a_median_of_the_newest():
     for top in [1.1, 1.1, *[1.8] * 40]:
         gallery.learn_height(top)
     assert gallery.top == pytest.approx(1.8)
-    for _ in range(40):
+    for _ in range(20):
         gallery.learn_height(1.5)
     assert gallery.top == pytest.approx(1.5)
 
@@ -411,10 +411,14 @@ def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
         watch(name)
     tracker = create_tracker('metric')
     board = Box(120, 0, 60, 160)
-    outcomes = set()
-    for i in range(36):
+    answers = []
+    for i in range(60):
         one = Someone(-0.9 + 0.05 * i, 3.0)
-        frame = picture([one], 0.1 * i, board if i > 12 else None)
+        # Comes out, is gone for a second and a half, and enters at the edge: a stranger at first.
+        away = 24 <= i < 40
+        frame = picture([] if away else [one], 0.1 * i, board if 12 < i < 24 else None)
+        if i >= 40:
+            frame = picture([Someone(-1.9 + 0.06 * (i - 40), 3.0)], 0.1 * i)
         if 6 <= i < 9:
             rows = slice(int(one.box.y) - 2, int(one.box.bottom) + 2)
             cols = slice(int(one.box.x) - 6, int(one.box.right) + 6)
@@ -427,9 +431,11 @@ def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
             tracker.start(frame, one.box)
             continue
         calls.clear()
-        tracker.update(frame)
+        track = tracker.update(frame)
         after = [call for call in calls if call != 'step']
         assert len(after) == 1, f'frame {i}: {calls}'
         assert calls.index(after[0]) == len(calls) - 1
-        outcomes.update(after)
-    assert outcomes == {'take', 'miss', 'seen_elsewhere'}
+        answers.append((track.box is not None, *after))
+    assert {outcome for _, outcome in answers} == {'take', 'miss', 'seen_elsewhere'}
+    assert (True, 'miss') in answers, 'who has come back is told of, but not yet taken'
+    assert answers[-1] == (True, 'take')
