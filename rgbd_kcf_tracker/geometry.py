@@ -8,10 +8,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+
+TYPE_CHECKING = False  # that of typing costs an import
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +168,8 @@ class Pose:
     translation: npt.NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        import numpy as np  # boxes are read by commands that start without it
+
         rotation = np.array(self.rotation, np.float64)
         translation = np.array(self.translation, np.float64)
         if rotation.shape != (3, 3) or translation.shape != (3,):
