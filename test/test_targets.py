@@ -184,6 +184,7 @@ def test_a_chosen_target_is_not_told_twice():
     assert number in before, 'who had an id already keeps it'
     tracks = targets.update(comers(31))
     assert set(tracks) == set(before)
+    assert tracks[number].velocity is not None, 'the track is that of who follows it with care'
     boxes = [t.box for t in tracks.values() if t.box is not None]
     assert boxes[0].iou(boxes[1]) < 0.1
 
@@ -242,9 +243,9 @@ def resized(frame: Frame, factor: int, depth: bool) -> Frame:
     return Frame(color, metres, frame.stamp_ns)
 
 
-@pytest.mark.parametrize('depth', [False, True])
-def test_a_target_is_kept_when_the_image_size_changes(depth: bool):
-    tracker = create_tracker('metric')
+@pytest.mark.parametrize(('depth', 'surfaces'), [(False, True), (True, True), (True, False)])
+def test_a_target_is_kept_when_the_image_size_changes(depth: bool, surfaces: bool):
+    tracker = create_tracker('metric', MetricParameters(use_surfaces=surfaces))
     tracker.start(resized(both(0), 2, depth), _times(left(0).box, 2))
     for i, factor in enumerate((2, 2, 1, 1, 3, 3, 2), start=1):
         track = tracker.update(resized(both(i), factor, depth))

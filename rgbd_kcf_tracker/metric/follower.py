@@ -144,11 +144,11 @@ class Follower:
         found = surface.step(account, dt)
         if found is None:
             return self._glance(frame, account.scene, view, dt, surface)
-        stranger = None
         if surface.hidden_for > REUNION and self.person is not None:
-            stranger = account.stranger(self.person, account.sight_of(found.seen))
-        if stranger is not None:
-            if not self._recognised(stranger, account.time):
+            index = account.sight_of(found.seen)
+            stranger = account.stranger(self.person, index)
+            new = index >= 0 and account.owner[index] < 0
+            if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 surface.miss(account.scene, dt)
                 return self._tracked(frame, box, found.probability, found.seen.depth)

@@ -14,6 +14,8 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 FOOT = 0.2
 """Metres above the floor up to which a body is taken to stand on it."""
+FOOT_SHARE = 0.2
+"""The same as a share of what shows: a ball that bounces has no feet."""
 RIM = 2
 """Columns without a reading from which the depth image is narrower than the colour image."""
 SLIMMEST = 0.4
@@ -36,7 +38,8 @@ def _foot(scene: Scene, seen: Silhouette) -> float:
     bottom = float(seen.top + rows)
     if scene.floor is not None and not seen.cut.bottom:
         foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
-        if 0 < (foot - bottom) * seen.depth / scene.view.intrinsics.fy < FOOT:
+        missing = (foot - bottom) * seen.depth / scene.view.intrinsics.fy
+        if 0 < missing < min(FOOT, FOOT_SHARE * seen.height):
             return foot
     return bottom
 
