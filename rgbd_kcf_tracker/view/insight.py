@@ -35,20 +35,6 @@ from rgbd_kcf_tracker.track import Tracker
 
 Array = npt.NDArray[Any]
 
-CUES = (
-    ('place', (0, 1, 2)),
-    ('look', (11, 12)),
-    ('who stands there', (13, 14)),
-    ('somebody else', (15, 16)),
-    ('stood still', (17, 18)),
-    ('size', (3, 4, 5, 8)),
-    ('time hidden', (6, 7)),
-    ('should be in sight', (9,)),
-    ('left the image', (10,)),
-    ('to begin with', (19,)),
-)
-"""What the regression's inputs are about, by their places in it."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Considered:
@@ -135,7 +121,7 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
         mask = np.zeros(scene.view.shape, bool)
         rows, cols = seen.mask.shape
         mask[seen.top : seen.top + rows, seen.left : seen.left + cols] = seen.mask
-        cues = {name: float(share[list(places)].sum()) for name, places in CUES}
+        cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
         considered.append(Considered(box, float(candidate.probability), cues, mask))
     cloud = surface._cloud if surface is not None else None
     floor = scene.floor

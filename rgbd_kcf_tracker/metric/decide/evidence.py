@@ -97,6 +97,19 @@ WEIGHTS = np.array(
     )
 )  # fmt: skip
 
+CUES = (
+    ('place', (0, 1, 2)),
+    ('look', (11, 12)),
+    ('who stands there', (13, 14)),
+    ('somebody else', (15, 16)),
+    ('size', (3, 4, 5, 8)),
+    ('time hidden', (6, 7)),
+    ('should be in sight', (9,)),
+    ('left the image', (10,)),
+    ('to begin with', (17,)),
+)
+"""What the regression's inputs are about, by their places in it."""
+
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
