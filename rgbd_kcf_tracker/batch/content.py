@@ -13,6 +13,7 @@ import contextlib
 import hashlib
 import json
 import os
+import stat
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -58,11 +59,15 @@ def _files(path: Path) -> Iterator[_Entry]:
             subfolders[:] = sorted(n for n in subfolders if not n.startswith('.'))
             for name in sorted(n for n in names if not n.startswith('.')):
                 file = Path(folder, name)
-                yield f'{path.name}/{file.relative_to(path).as_posix()}', file, file.stat()
-    elif path.exists():
-        yield path.name, path, path.stat()
+                yield _entry(f'{path.name}/{file.relative_to(path).as_posix()}', file)
     else:
-        yield path.name, None, None
+        yield _entry(path.name, path)
+
+
+def _entry(name: str, path: Path) -> _Entry:
+    """Only of files is the content read: a pipe would be waited for, and is refused when used."""
+    state = path.stat() if path.exists() else None
+    return name, path if state is not None and stat.S_ISREG(state.st_mode) else None, state
 
 
 def _file_digest(path: Path) -> str:
