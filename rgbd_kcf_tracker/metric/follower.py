@@ -289,6 +289,5 @@ def _room_share(account: Account, box: Box) -> float:
     step = scene.view.step
     x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
     y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
-    part = scene.view.depth[y0:y1, x0:x1] > 0
-    part &= ~scene.before[y0:y1, x0:x1]
+    part = scene.still[y0:y1, x0:x1]
     return float(part.mean()) if part.size else 0.0

@@ -182,8 +182,7 @@ class Account:
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
-        before = self.scene.before[seen.rows, seen.cols][seen.mask]
-        return 1.0 - np.count_nonzero(before) / len(before)
+        return float(self.scene.still[seen.rows, seen.cols][seen.mask].mean())
 
     def _room_beside(self, person: Person, seen: Silhouette) -> float:
         """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
@@ -217,7 +216,7 @@ class Account:
             return np.zeros(self.which.shape, np.bool_)
         mask: npt.NDArray[np.bool_] = theirs[self.which]
         if person.mobile:
-            mask &= ~(self.scene.before & (self.which == 0))
+            mask &= self.scene.still | (self.which != 0)
         return mask
 
     def stranger(self, person: Person, index: int) -> Person | None:
@@ -417,7 +416,8 @@ class Crowd:
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
         if account.settled and seen.area > WHOLE:
-            person.mobile |= account.room_share(seen) < PART_OF_ROOM
+            before = account.scene.before[seen.rows, seen.cols][seen.mask]
+            person.mobile |= bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
             others = np.delete(account.odds[:, index], row)

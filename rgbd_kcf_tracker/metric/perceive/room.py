@@ -84,11 +84,13 @@ class Room:
     Attributes:
         depth: ``(h, w)`` float32 metres of the room, 0 where it is not known.
         before: ``(h, w)`` bool, the pixels of the last frame that show something before the room.
+        still: ``(h, w)`` bool, those that show the room where it was in the frames before.
     """
 
     def __init__(self) -> None:
         self.depth: DepthArray = np.zeros((0, 0), np.float32)
         self.before: Mask = np.zeros((0, 0), np.bool_)
+        self.still: Mask = self.before
         self._farther: DepthArray = self.depth
         self._front: DepthArray = self.depth
         self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
@@ -99,6 +101,7 @@ class Room:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
         self.depth = np.where(somebody, np.float32(0), depth)
         self.before = somebody & (depth > 0)
+        self.still = np.zeros(depth.shape, np.bool_)
         self._farther = np.zeros_like(depth)
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
@@ -174,7 +177,7 @@ class Room:
         self.depth[fresh] = depth[fresh]
         unknown &= ~valid
         self._blind[unknown] = np.minimum(self._blind[unknown], 250) + 1
-        self.before = before
+        self.before, self.still = before, same
         self._settle(depth, dt, allowed, somebody)
 
     def _settle(

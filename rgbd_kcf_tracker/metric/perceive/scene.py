@@ -35,6 +35,7 @@ class Scene:
             is known.
         standing: ``(h, w)`` bool, pixels with a reading that are not floor.
         before: ``(h, w)`` bool, pixels that show something before the room.
+        still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         codes: ``(h, w)`` int32 colour codes.
@@ -49,6 +50,7 @@ class Scene:
     forward: npt.NDArray[np.float32]
     standing: npt.NDArray[np.bool_]
     before: npt.NDArray[np.bool_]
+    still: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     codes: npt.NDArray[np.int32]
@@ -142,7 +144,18 @@ class SceneReader:
         lab = view_lab(self._light.steadied(image, ~before))
         codes = color_codes(lab)
         return Scene(
-            view, floor, elevation, forward, mask, before, surfaces, self._rim, codes, lab, motion
+            view,
+            floor,
+            elevation,
+            forward,
+            mask,
+            before,
+            self.room.still,
+            surfaces,
+            self._rim,
+            codes,
+            lab,
+            motion,
         )
 
     def _move(
