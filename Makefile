@@ -24,7 +24,7 @@ demo: $(VENV)/.installed ## simulate a recording, run both nodes over it, show t
 	$(BIN)/python -m rgbd_kcf_tracker.bench.demo demo
 
 test: $(VENV)/.installed-test ## run the whole suite
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(PYTEST)
+	$(BIN)/python -m pytest $(PYTEST)
 
 inject: $(VENV)/.installed ## try faults of files, disks and signals on every command
 	$(BIN)/python -m rgbd_kcf_tracker.bench.inject $(INJECT)
