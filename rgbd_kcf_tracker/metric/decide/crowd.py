@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import upright
+from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
@@ -151,11 +151,8 @@ class Account:
         for sight in self.sights:
             if sight.figure.seen is seen:
                 return sight.view
-        top = None
-        scene = self.scene
-        if scene.elevation is not None and not seen.cut.top:
-            top = float(np.percentile(scene.elevation[seen.rows, seen.cols][seen.mask], 98))
-        return View.of(scene.view, scene.lab, seen, top)
+        top = None if seen.cut.top else self.scene.highest(seen)
+        return View.of(self.scene.view, self.scene.codes, seen, top)
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``."""
@@ -292,7 +289,7 @@ class Crowd:
                 person.carried(scene.motion, scene.ahead)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
-        sights = [Sight(f, View.of(scene.view, scene.lab, f.seen, f.top)) for f in figures]
+        sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
         settled = self._frames > SETTLED
         odds, looks = self._odds(sights, time)
         account = Account(scene, time, sights, list(self.people), odds, looks, settled)
@@ -425,6 +422,7 @@ class Crowd:
             if account.odds[row, index] - rival < SURE:
                 return
         person.upright |= upright(seen, scene.view.intrinsics, view.top)
+        person.upright |= account.settled and person_sized(seen)
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted

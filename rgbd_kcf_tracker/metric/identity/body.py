@@ -12,12 +12,11 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
-    CODES,
     band_histograms,
     band_similarity,
     bands_of_rows,
-    smoothed,
 )
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 

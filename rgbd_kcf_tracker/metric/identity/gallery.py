@@ -3,7 +3,7 @@
 
 """How somebody looks, remembered as a few views, and the probability that two sightings are one.
 
-A view is a colour histogram in CIE Lab for each slice of the body, counted in metres down from the
+A view is a histogram of colour codes for each slice of the body, counted in metres down from the
 top of the head, so that it does not change with distance (colour in height slices is the common
 root of the hand-made descriptors, as of Lisanti et al., "Person re-identification by iterative
 re-weighted sparse ranking", 2015). Views are compared slice by slice by the Bhattacharyya
@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
@@ -26,10 +27,6 @@ FloatArray = npt.NDArray[np.float32]
 
 SLICES, SLICE = 9, 0.2
 """Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
-LIGHTNESS, CHROMA = 10, 7
-"""Levels of lightness and of each chroma channel."""
-CHROMA_GAIN = 0.1
-"""Steepness of the chroma levels: clothes have little chroma, so they lie close about grey."""
 COLORFUL = 2.0
 """By how much a colour weighs more with each level that it is away from grey: half of all people
 wear dark grey, so that it says little of who it is."""
@@ -43,7 +40,7 @@ LEAST_SLICE = 0.004
 LEAST_PIXELS = 30
 """Pixels left of a silhouette without its rim, where colours are mixed with the background's."""
 
-STEEPNESS, EVEN, EVEN_PER_VIEW = 11.0, 0.62, 0.05
+STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.59, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
@@ -54,21 +51,17 @@ ONE_SIDE, ALL_SIDES = 0.4, 4
 and the further views from which all sides are known."""
 WHOLE_AREA = 0.3
 """Square metres of a view in which all of somebody shows; less of it tells less."""
-HEIGHT_SIGMA = 0.045
-"""Metres by which the height of one person's head differs between two sightings."""
-PEOPLE_HEIGHT, PEOPLE_SIGMA = 1.72, 0.11
-"""Metres of people's height (adults, both sexes)."""
-STOOPED = 0.25
-"""Share of sightings in which somebody does not stand upright."""
+HEIGHT_SIGMA = 0.07
+"""Metres by which the height of one person's head differs between two sightings: gait, hair, and a
+floor that is a little out of true."""
+ANY_HEIGHT = 1.5
+"""Share of all people's heads in each metre of height, about the same from 1.4 to 2 m."""
+STOOPED = 0.5
+"""Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden."""
 
-_LEVEL = (np.arange(256) * LIGHTNESS // 256).astype(np.int32)
-_TINT = np.minimum(
-    CHROMA / 2 * (1 + np.tanh((np.arange(256) - 128.0) * CHROMA_GAIN)), CHROMA - 1
-).astype(np.int32)
-_FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(CHROMA) - CHROMA // 2] * 2, indexing='ij'))
+_FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(TINTS) - TINTS // 2] * 2, indexing='ij'))
 _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
 _SLICE_WEIGHT = np.array([HEAD_WEIGHT] + [1.0] * (SLICES - 1), np.float32)
-_CODES = LIGHTNESS * CHROMA * CHROMA
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +69,7 @@ class View:
     """One sighting of somebody's look.
 
     Attributes:
-        roots: ``(SLICES, LIGHTNESS, CHROMA * CHROMA)`` float32, square roots of the weighted
+        roots: ``(SLICES, LIGHTNESS, TINTS * TINTS)`` float32, square roots of the weighted
             histograms, each slice of length 1, or 0 where nothing of it shows.
         area: ``(SLICES,)`` float32 square metres that show.
         color: ``(SLICES,)`` float32, how colourful each slice is, at least 1.
@@ -90,13 +83,13 @@ class View:
 
     @classmethod
     def of(
-        cls, view: DepthView, lab: npt.NDArray[np.uint8], seen: Silhouette, top: float | None
+        cls, view: DepthView, codes: npt.NDArray[np.int32], seen: Silhouette, top: float | None
     ) -> View:
         """The look of a silhouette.
 
         Args:
             view: the depth that the silhouette is of.
-            lab: ``(h, w, 3)`` CIE Lab of the view.
+            codes: ``(h, w)`` colour codes of the view.
             seen: the silhouette.
             top: metres above the floor of its top, or None.
         """
@@ -106,13 +99,10 @@ class View:
         down = (np.arange(len(mask), dtype=np.float32) + 0.5) * np.float32(
             seen.depth / view.intrinsics.fy / SLICE
         )
-        part = np.minimum(down.astype(np.int32), SLICES - 1)[:, None] * _CODES
-        crop = lab[seen.rows, seen.cols]
-        codes = (_LEVEL[crop[..., 0]] * CHROMA + _TINT[crop[..., 1]]) * CHROMA
-        codes += _TINT[crop[..., 2]]
-        codes += part
-        counts = np.bincount(codes[mask.view(np.bool_)], minlength=SLICES * _CODES)
-        cube = _smoothed(counts.reshape(SLICES, LIGHTNESS, CHROMA, CHROMA).astype(np.float32))
+        part = np.minimum(down.astype(np.int32), SLICES - 1)[:, None] * CODES
+        parts = (codes[seen.rows, seen.cols] + part)[mask.view(np.bool_)]
+        counts = np.bincount(parts, minlength=SLICES * CODES).astype(np.float32)
+        cube = smoothed(counts.reshape(SLICES, CODES)).reshape(SLICES, LIGHTNESS, TINTS, TINTS)
         pixels = cube.reshape(SLICES, -1).sum(axis=1)
         cube /= np.maximum(pixels, 1)[:, None, None, None]
         roots = np.sqrt(cube)
@@ -134,25 +124,12 @@ class View:
         return float(self.area.sum())
 
 
-def _smoothed(cube: FloatArray) -> FloatArray:
-    """Each count shared with its neighbours along the last three axes: 1/4, 1/2, 1/4."""
-    for axis in (1, 2, 3):
-        moved = np.moveaxis(cube, axis, 0)
-        out = moved * np.float32(0.5)
-        out[1:] += np.float32(0.25) * moved[:-1]
-        out[:-1] += np.float32(0.25) * moved[1:]
-        out[0] += np.float32(0.25) * moved[0]
-        out[-1] += np.float32(0.25) * moved[-1]
-        cube = np.moveaxis(out, 0, axis)
-    return cube
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
     """Several views stacked, for comparing one with all of them at once.
 
     Attributes:
-        roots: ``(SLICES, n * LIGHTNESS, CHROMA * CHROMA)``.
+        roots: ``(SLICES, n * LIGHTNESS, TINTS * TINTS)``.
         area, color: ``(n, SLICES)``.
     """
 
@@ -235,9 +212,8 @@ def height_log_odds(top: float | None, known: float | None) -> float:
     """Log-odds that a head's height above the floor is the person's rather than anybody's."""
     if top is None or known is None:
         return 0.0
-    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) + STOOPED
-    other = (1 - STOOPED) * _normal(top - PEOPLE_HEIGHT, PEOPLE_SIGMA) + STOOPED
-    return float(np.log(same / other))
+    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) / ANY_HEIGHT + STOOPED
+    return float(np.log(same))
 
 
 def _normal(x: float, sigma: float) -> float:
@@ -257,6 +233,7 @@ MOST_VIEWS = 14
 NOVEL = 0.9
 """Likeness to the nearest view from which a new one adds nothing."""
 HEIGHT_MEMORY = 25
+"""Heights of one person that are remembered: some seconds, so that a stoop does not stay."""
 
 
 class Gallery:

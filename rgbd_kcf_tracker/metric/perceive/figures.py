@@ -253,11 +253,9 @@ def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figu
     cut_off = seen.cut.any
     if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
         return None
-    highest: float | None = None
-    if scene.elevation is not None:
-        highest = float(np.percentile(scene.elevation[seen.rows, seen.cols][mask], 98))
-        if highest < LEAST_TOP:
-            return None
+    highest = scene.highest(seen)
+    if highest is not None and highest < LEAST_TOP:
+        return None
     left_end, _, right_end, _ = seen.metres
     ahead = float(scene.forward[seen.rows, seen.cols][mask].mean())
     place = np.array([(left_end + right_end) / 2, ahead])

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.metric.perceive.color_bands import color_codes, view_image, view_lab
+from rgbd_kcf_tracker.metric.perceive.colors import color_codes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
@@ -38,8 +38,7 @@ class Scene:
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
-        codes: ``(h, w)`` int32 colour codes.
-        lab: ``(h, w, 3)`` uint8 CIE Lab, in the light of the first frame.
+        codes: ``(h, w)`` int32 colour codes, in the light of the first frame.
         motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
             where it has moved and nothing tells how.
     """
@@ -54,7 +53,6 @@ class Scene:
     surfaces: Surfaces
     rim: Rim
     codes: npt.NDArray[np.int32]
-    lab: npt.NDArray[np.uint8]
     motion: Pose | Lost | None
 
     @property
@@ -69,6 +67,12 @@ class Scene:
         left, top, width, height = (int(v) for v in self.surfaces.boxes[label])
         mask = self.surfaces.labels[top : top + height, left : left + width] == label
         return Silhouette.of(self.view, left, top, mask, label, self.rim)
+
+    def highest(self, seen: Silhouette) -> float | None:
+        """Metres above the floor of a silhouette's upper end, None where no floor is known."""
+        if self.elevation is None:
+            return None
+        return float(np.percentile(self.elevation[seen.rows, seen.cols][seen.mask], 98))
 
 
 class SceneReader:
@@ -141,8 +145,7 @@ class SceneReader:
                 somebody = None
             self.room.update(view.depth, seconds, somebody)
         before = self.room.before
-        lab = view_lab(self._light.steadied(image, ~before))
-        codes = color_codes(lab)
+        codes = color_codes(self._light.steadied(image, ~before))
         return Scene(
             view,
             floor,
@@ -154,7 +157,6 @@ class SceneReader:
             surfaces,
             self._rim,
             codes,
-            lab,
             motion,
         )
 

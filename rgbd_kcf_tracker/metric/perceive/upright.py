@@ -32,6 +32,8 @@ SLIM = 0.85
 """Width against height, at the most, where nothing is cut off below."""
 FILL = 0.45
 """Share of the box that a body fills, at the least: a rack or a plant fills less."""
+LENGTH = (1.2, 0.8)
+"""Metres of a person whose shape is not told: whole, and cut off above or below."""
 BROADER_SIDEWAYS, TALL, NARROW = 1.1, 1.2, 0.45
 """The same of somebody seen from the side, who must show 1.2 m and be no wider than 45 % of it."""
 
@@ -69,6 +71,20 @@ def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
         return False
     sideways = seen.height >= TALL and seen.width <= NARROW * seen.height
     return shoulder_width >= (BROADER_SIDEWAYS if sideways else BROADER) * head_width
+
+
+def person_sized(seen: Silhouette) -> bool:
+    """Whether a silhouette has the breadth and length of a person, if not the shape.
+
+    That is enough for what has come to stand before a room that is known: somebody too near to the
+    camera for his head to show, or who stoops.
+    """
+    cut_off = seen.cut.top or seen.cut.bottom
+    return (
+        LENGTH[cut_off] <= seen.height <= HEIGHT[1]
+        and WIDTH[0] <= seen.width <= WIDTH[1]
+        and seen.area >= FILL * seen.width * seen.height
+    )
 
 
 def upright_people(

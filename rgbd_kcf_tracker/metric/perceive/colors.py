@@ -1,0 +1,93 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Colours as codes that a change of light only shifts.
+
+Lightness and tint are taken from logarithms of the channels: light that is twice as strong then
+adds the same to all three, so that it moves lightness by a level or two and leaves the tint, the
+differences between channels, as it is (log-chromaticity; Finlayson and Hordley, "Color constancy at
+a pixel", 2001). In CIE Lab, where a colour's chroma grows with its lightness, somebody who comes
+from a dark doorway to the window becomes somebody else.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+LIGHTNESS, TINTS = 10, 7
+"""Levels of lightness, and of red and blue against green each."""
+CODES = LIGHTNESS * TINTS * TINTS
+
+DARKEST = 20.0
+"""Added to each channel before the logarithm: what is darker than this is mostly noise."""
+STEEPNESS = 3.0
+"""Of the tint levels: clothes have little tint, so the levels lie close about grey."""
+_STEPS = 32
+"""Steps of the logarithm for each factor of e: finer than the levels by far."""
+
+_LOG = np.rint(_STEPS * np.log((np.arange(256) + DARKEST) / DARKEST)).astype(np.uint8)
+_TOP = int(_LOG[-1])
+_LEVEL = (np.arange(_TOP + 1) * LIGHTNESS // (_TOP + 1)).astype(np.int32) * (TINTS * TINTS)
+_TINT = np.minimum(
+    TINTS / 2 * (1 + np.tanh(np.arange(-_TOP, _TOP + 1) * (STEEPNESS / _STEPS))), TINTS - 1
+).astype(np.int32)
+_TINT_OF_RED = _TINT * TINTS
+_LUMA = np.array([[0.11, 0.59, 0.30]], np.float32)
+"""Shares of blue, green and red in lightness (ITU-R BT.601, rounded)."""
+
+
+def view_image(
+    color: npt.NDArray[np.uint8], step: int, shape: tuple[int, int]
+) -> npt.NDArray[np.uint8]:
+    """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
+
+    Args:
+        color: the image.
+        step: as of the :class:`~rgbd_kcf_tracker.metric.perceive.depth_view.DepthView`.
+        shape: rows and columns of the result.
+
+    Returns:
+        ``shape + (3,)`` uint8.
+    """
+    half = step // 2
+    return np.ascontiguousarray(color[half::step, half::step][: shape[0], : shape[1]])
+
+
+def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
+    """Code 0 to ``CODES - 1`` of each pixel, ``(h, w)``, of an image ``(h, w, 3)`` uint8 BGR.
+
+    Lightness counts ``TINTS ** 2``, red against green ``TINTS``, blue against green 1.
+    """
+    logs = cv2.LUT(image, _LOG)
+    blue, green, red = cv2.split(logs)
+    codes: npt.NDArray[np.int32] = _LEVEL[cv2.transform(logs, _LUMA)]
+    offset = _TOP - green.astype(np.int16)
+    codes += _TINT_OF_RED[red + offset]
+    codes += _TINT[blue + offset]
+    return codes
+
+
+def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Each code's count shared with its neighbours: 1/4, 1/2, 1/4 along each of the three axes.
+
+    A small change of light then does not move a colour out of its bin.
+
+    Args:
+        counts: ``(n, CODES)``.
+
+    Returns:
+        The same shape.
+    """
+    cube = counts.reshape(-1, LIGHTNESS, TINTS, TINTS)
+    for axis in (1, 2, 3):
+        moved = np.moveaxis(cube, axis, 0)
+        out = moved * np.float32(0.5)
+        out[1:] += np.float32(0.25) * moved[:-1]
+        out[:-1] += np.float32(0.25) * moved[1:]
+        out[0] += np.float32(0.25) * moved[0]
+        out[-1] += np.float32(0.25) * moved[-1]
+        cube = np.moveaxis(out, 0, axis)
+    result: npt.NDArray[np.float32] = cube.reshape(counts.shape)
+    return result
