@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, CHANNELS, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 
 STEP = 1.02
 COUNT = 17
@@ -37,8 +38,8 @@ class ScaleFilter:
         self._hog = HogExtractor(self._rows * COUNT, self._cols)
         steps = np.arange(COUNT) - COUNT // 2
         self._factors = STEP ** steps.astype(float)
-        label = np.exp(-0.5 * (steps / (0.25 * np.sqrt(COUNT))) ** 2)
-        self._label = np.conj(fft.rfft(fft.ifftshift(label))).astype(np.complex64)
+        label = gaussian_labels((COUNT,), 0.25 * np.sqrt(COUNT))
+        self._label = np.conj(fft.rfft(label)).astype(np.complex64)
         self._window = np.hanning(COUNT + 2)[1:-1].astype(np.float32)
         self._numerator: npt.NDArray[np.complex64] | None = None
         self._denominator: npt.NDArray[np.float32] | None = None
