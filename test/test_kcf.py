@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from rgbd_kcf_tracker import Box, Frame, RgbdKcfError, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation import otb_reference
+from rgbd_kcf_tracker.features.windows import bordered
 from rgbd_kcf_tracker.thesis.kcf import KcfParameters, WindowGeometry
-from rgbd_kcf_tracker.thesis.window import cut, gray_window
+from rgbd_kcf_tracker.thesis.window import gray_window
 
 
 def texture(height: int, width: int, seed: int, blur: float = 2.0) -> npt.NDArray[np.uint8]:
@@ -40,7 +41,7 @@ def scene(x: int, y: int, width: int = 40, height: int = 90) -> Frame:
     window=st.tuples(st.integers(1, 20), st.integers(1, 20)),
 )
 @settings(max_examples=200, deadline=None)
-def test_a_cut_repeats_the_border(
+def test_a_window_repeats_the_border(
     size: tuple[int, int], corner: tuple[int, int], window: tuple[int, int]
 ) -> None:
     rows, cols = size
@@ -48,7 +49,7 @@ def test_a_cut_repeats_the_border(
     row = np.clip(np.arange(corner[1], corner[1] + window[1]), 0, rows - 1)
     col = np.clip(np.arange(corner[0], corner[0] + window[0]), 0, cols - 1)
     np.testing.assert_array_equal(
-        cut(image, corner[0], corner[1], window[0], window[1]), image[row[:, None], col]
+        bordered(image, corner[0], corner[1], window[0], window[1]), image[row[:, None], col]
     )
 
 
