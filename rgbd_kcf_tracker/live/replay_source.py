@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.recordings.bag_writer import GENERIC
 from rgbd_kcf_tracker.recordings.bags import BagRecording
 from rgbd_kcf_tracker.recordings.encoding import RawImage, encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
-from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, ReadOptions
+from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 from rgbd_kcf_tracker.recordings.storage import Topic
 
@@ -42,7 +42,7 @@ class SourceTopic:
     count: int
 
 
-class ReplaySource:
+class ReplaySource(Closing):
     """Opens a recording for replay. Use it in a ``with`` block.
 
     Args:
@@ -147,12 +147,6 @@ class ReplaySource:
     def close(self) -> None:
         """Close the files."""
         self._messages.close()
-
-    def __enter__(self) -> ReplaySource:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class _BagMessages:

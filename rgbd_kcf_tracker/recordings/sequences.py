@@ -9,7 +9,6 @@ import statistics
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
@@ -23,7 +22,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_color_bytes,
     decode_depth_bytes,
 )
-from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
+from rgbd_kcf_tracker.recordings.recording import Closing, ReadOptions, RecordingInfo, StreamInfo
 from rgbd_kcf_tracker.recordings.textfiles import (
     folder_intrinsics,
     known,
@@ -42,7 +41,7 @@ def is_sequence_folder(path: Path) -> bool:
     return any((path / name).is_dir() for name in COLOR_FOLDERS)
 
 
-class SequenceFolder:
+class SequenceFolder(Closing):
     """A :class:`Recording` of a folder with ``rgb/``.
 
     Read where they are there: ``depth/``, ``groundtruth.txt``,
@@ -116,17 +115,6 @@ class SequenceFolder:
 
     def close(self) -> None:
         """Nothing stays open."""
-
-    def __enter__(self) -> SequenceFolder:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _find_depths(self, options: ReadOptions) -> list[Path | None]:
         folder = self.path / DEPTH_FOLDER
