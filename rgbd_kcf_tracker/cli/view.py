@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_overwrite_option,
     add_reading_options,
     add_scene_options,
+    add_tracker_options,
     counter,
     open_source,
     parse_assignments,
@@ -47,18 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the target's box in the first frame shown (default: the first ground-truth box, "
         'else it is picked in the page)',
     )
-    parser.add_argument(
-        '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
-    )
-    parser.add_argument(
-        '--param',
-        metavar='KEY=VALUE',
-        nargs='+',
-        action='extend',
-        default=[],
-        help='parameters of the tracker; an unknown name lists those there are',
-    )
-    parser.add_argument('--start', metavar='N', type=int, default=0, help='first frame (default 0)')
+    add_tracker_options(parser)
     page = parser.add_argument_group('page')
     page.add_argument('--port', metavar='P', type=int, default=8080, help='TCP port (default 8080)')
     page.add_argument(

@@ -114,8 +114,7 @@ class MetricTargets:
     def _perceive(self, frame: Frame) -> float:
         dt = 0.0
         if self._stamp_ns is not None:
-            dt = (frame.stamp_ns - self._stamp_ns) * 1e-9
-            dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
+            dt = frame.seconds_since(self._stamp_ns, SHORTEST_STEP, LONGEST_STEP)
         self._stamp_ns = frame.stamp_ns
         self._time += dt
         self._frame = frame

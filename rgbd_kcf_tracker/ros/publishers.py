@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.live.annotate import annotated
+from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.ros.messages import (
     detections_from_track,
     image_message,
@@ -107,7 +107,7 @@ class TrackPublishers:
             self._marker.publish(marker_from_track(header, track, intrinsics, MARKER_LIFETIME_S))
             self._marked = track.position is not None
         if self.image_wanted:
-            self._image.publish(image_message(header, annotated(frame.color, track), 'bgr8'))
+            self._image.publish(image_message(header, draw_track(frame.color, track), 'bgr8'))
 
     def destroy(self) -> None:
         """Take the topics down."""

@@ -128,7 +128,7 @@ class DepthAwareTracker(ABC):
             return Track(None, TrackState.IDLE)
         if (frame.width, frame.height) != self._image_size:
             self._rescale(frame, self._model)
-        interval = min(max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0), _LONGEST_INTERVAL_S)
+        interval = frame.seconds_since(self._stamp_ns, 0.0, _LONGEST_INTERVAL_S)
         self._stamp_ns = frame.stamp_ns
         found = self._follow(frame, self._model, interval)
         if found is not None:

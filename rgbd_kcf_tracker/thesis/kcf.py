@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import Parameters, parameter
@@ -29,7 +30,6 @@ from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,
-    gaussian_labels,
     peak,
 )
 from rgbd_kcf_tracker.thesis.window import gray_window

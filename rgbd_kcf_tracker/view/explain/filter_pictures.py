@@ -11,6 +11,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.thesis import correlation, window
 from rgbd_kcf_tracker.thesis.correlation import CorrelationFilter, linear_correlation
@@ -243,7 +244,7 @@ def _shifts(
 
 
 def _labels(first: Moment) -> Picture:
-    call = _calls(first, correlation.gaussian_labels)[0]
+    call = _calls(first, gaussian_labels)[0]
     labels = centred(call.value)
     figure = plot_style.figure(9.5, 4.2)
     show_mesh(figure, (1, 2, 1), labels, 'from the side', 'label', low=0, high=1)
@@ -257,7 +258,7 @@ def _labels(first: Moment) -> Picture:
         'hill, and the top of the hill is the target.',
         r'y = \exp\left(-\frac{\Delta x^2 + \Delta y^2}{2\sigma^2}\right)'
         rf',\quad \sigma = {call.given["sigma"]:.2f}\ cells',
-        _named(correlation.gaussian_labels), plot_style.png(figure),
+        _named(gaussian_labels), plot_style.png(figure),
         {'labels': call.value, 'sigma': call.given['sigma']},
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rgbd_kcf_tracker.evaluation import plot_style
+from rgbd_kcf_tracker.features.sampling import systematic_resample
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.thesis.color_histogram import ColorHistogram, bhattacharyya_distance
 from rgbd_kcf_tracker.thesis.particle_filter import (
@@ -20,7 +21,6 @@ from rgbd_kcf_tracker.thesis.particle_filter import (
     X,
     Y,
     normal_likelihood,
-    systematic_resample,
 )
 from rgbd_kcf_tracker.view.explain.moments import Moment, ParticleMoments
 from rgbd_kcf_tracker.view.explain.picture import (
