@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.view.explain.picture import (
     rgb,
     show_image,
 )
-from rgbd_kcf_tracker.view.insight import COMPUTED_BY, Insight, insight_of
+from rgbd_kcf_tracker.view.insight import COMPUTED_BY, Insight, colors_of, insight_of
 from rgbd_kcf_tracker.view.watch import name_of
 
 _SHOWN = 4
@@ -197,8 +197,8 @@ def _gallery(seen: _Seen) -> Picture:
     show_image(axes[0], rgb(frame), f'frame {number}')
     if track.box is not None:
         draw_box(axes[0], track.box, SEEN)
-    slices = max(len(view) for view in insight.gallery)
-    stripes = np.stack([*insight.gallery], axis=1)
+    stripes = np.stack([colors_of(view) for view in insight.gallery], axis=1)
+    slices = len(stripes)
     axes[1].set_facecolor(plot_style.NOTHING)
     axes[1].imshow(np.ma.masked_invalid(stripes).filled(0.85), interpolation='nearest')
     axes[1].set_xticks(range(len(insight.gallery)))
