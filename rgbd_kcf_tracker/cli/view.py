@@ -49,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'else it is picked in the page)',
     )
     add_tracker_options(parser)
+    parser.add_argument(
+        '--all', action='store_true', help='follow everyone in view too; only metric can'
+    )
     page = parser.add_argument_group('page')
     page.add_argument('--port', metavar='P', type=int, default=8080, help='TCP port (default 8080)')
     page.add_argument(
@@ -91,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
             return _export(args, recording, variant, parameters, start, box)
         from rgbd_kcf_tracker.view.player import Player
 
-        player = Player(recording, variant, parameters, start=start, box=box)
+        player = Player(recording, variant, parameters, start=start, box=box, everyone=args.all)
         serve(player, args.host, args.port, _token(args), args.open)
     return 0
 
@@ -141,7 +144,7 @@ def _start(args: argparse.Namespace, recording: Recording) -> tuple[int, Box | N
     try:
         return first_box(recording, given, args.start)
     except BoxError:
-        if args.export is not None:
+        if args.export is not None and not args.all:
             raise
         return args.start, None
 
@@ -161,12 +164,11 @@ def _export(
     end = len(recording) if args.end is None else min(args.end, len(recording))
     if end <= start:
         raise ParameterError(f'--end {args.end}: it must be above {start}, where the target is')
-    assert box is not None
     assert isinstance(parameters, Parameters)
     with counter(end - start, 'frame') as done:
         count = export(
             recording, path, variant, parameters, start, end, box,
-            lambda number: done(1, ''), args.overwrite,
+            lambda number: done(1, ''), args.overwrite, args.all,
         )  # fmt: skip
     size = path.stat().st_size / 1e6
     print(

@@ -109,6 +109,13 @@ class MetricTargets:
         """The last track of a target: after :meth:`add`, that of its first frame."""
         return dataclasses.replace(self._followers[number].track, id=number)
 
+    def person(self, number: int) -> Person | None:
+        """Whom an id belongs to, None where that is not known or forgotten."""
+        for person in self._crowd.people:
+            if self._names.get(person.number) == number:
+                return person
+        return None
+
     # -- parts ------------------------------------------------------------------------------------
 
     def _perceive(self, frame: Frame) -> float:

@@ -95,12 +95,16 @@ class DepthAwareTracker(ABC):
         parameters: of the depth test and the filter.
         low: response at and below which a target without depth to ask about counts as hidden.
         high: response from which the target is surely seen.
+
+    Attributes:
+        response: the filter's highest in the last frame.
     """
 
     def __init__(self, parameters: DepthParameters, low: float, high: float) -> None:
         self._depth_parameters = parameters
         self._low, self._high = low, max(high, low + 1e-6)
         self._model: KcfModel | None = None
+        self.response: float | None = None
 
     def start(self, frame: Frame, box: Box) -> Track:
         """Take the target in ``box``; see :class:`~rgbd_kcf_tracker.track.Tracker`.
