@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -50,3 +51,18 @@ def test_soak_shortened(tmp_path: Path) -> None:
     assert result['answered'] == result['sent'] == 1000
     assert result['boxes'] > 900
     assert result['end_mb'] - result['settled_mb'] < soak.GROWTH_MB
+
+
+@pytest.mark.parametrize('command', [live.main, soak.main])
+def test_figures_of_an_earlier_run_are_kept(
+    command: Callable[[list[str]], int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    earlier = tmp_path / 'earlier.json'
+    earlier.write_text('[]')
+    with pytest.raises(SystemExit, match='2'):
+        command(['--output', str(earlier)])
+    assert '--overwrite' in capsys.readouterr().err
+    assert earlier.read_text() == '[]'
+    with pytest.raises(SystemExit, match='2'):
+        command(['--output', str(tmp_path / 'nowhere' / 'a.json')])
+    assert 'nowhere' in capsys.readouterr().err

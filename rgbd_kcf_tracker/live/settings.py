@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 NEWEST, ALL = 'newest', 'all'
@@ -117,6 +118,14 @@ class NodeParameters(Parameters):
     qos_depth: int = parameter(
         5, 'QoS history depth of the image subscriptions.', unit='messages', minimum=1, maximum=1000
     )
+    max_pixels: int = parameter(
+        MAX_PIXELS,
+        'Pixels of the largest image that is read: a few kB of PNG can claim an image that takes '
+        'seconds to unpack.',
+        unit='px',
+        minimum=1,
+        maximum=MAX_SIDE * MAX_SIDE,
+    )
     autostart: bool = parameter(
         True, 'Configure and activate at once; false waits for a lifecycle manager.'
     )
@@ -130,6 +139,7 @@ READ_ONLY = frozenset(
         'depth_transport',
         'reliability',
         'qos_depth',
+        'max_pixels',
         'autostart',
     }
 )
