@@ -40,13 +40,10 @@ class NodeParameters(Parameters):
     )
     auto_init: bool = parameter(
         False,
-        'Choose the target without being told: the nearest upright person-sized thing in range.',
+        'Choose the target without being told: the nearest person in range, by depth and motion.',
     )
     auto_init_again: bool = parameter(
         False, 'With auto_init: choose again when the target is lost, instead of searching on.'
-    )
-    auto_init_confirm: bool = parameter(
-        True, "With auto_init: take only what OpenCV's HOG people detector also finds."
     )
     auto_init_near: float = parameter(
         0.5, 'Nearest distance at which auto_init looks.', unit='m', minimum=0.1, maximum=20.0
