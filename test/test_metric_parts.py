@@ -23,12 +23,10 @@ from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
-    CODES,
     band_histograms,
     band_similarity,
-    color_codes,
-    view_lab,
 )
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, color_codes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -137,7 +135,7 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     color = np.zeros((80, 40, 3), np.uint8)
     color[:40] = (200, 30, 30)
     color[40:] = (30, 30, 200)
-    codes = color_codes(view_lab(color))
+    codes = color_codes(color)
     mask = np.ones((80, 40), bool)
     counts = band_histograms(codes, mask, 0, 80)
     assert counts.shape == (BANDS, CODES)
