@@ -10,10 +10,11 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
+from people_rig import GOOD
 
 from rgbd_kcf_tracker import Frame, Intrinsics
 from rgbd_kcf_tracker.features.windows import resampled
-from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
@@ -301,21 +302,6 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
 
 
 # -- the verdict ----------------------------------------------------------------------------------
-
-
-GOOD = Evidence(
-    step=0.5,
-    stride=0.1,
-    fraction=1.0,
-    height=0.0,
-    gone=0.1,
-    missing=False,
-    inland=0.0,
-    look=3.0,
-    mine=5.0,
-    rival=0.0,
-    room=0.0,
-)
 
 
 def test_evidence_speaks_for_what_fits_and_against_what_does_not():
