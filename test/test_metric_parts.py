@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 CAMERA = Intrinsics(200, 200, 120, 80)
 
@@ -99,7 +99,7 @@ def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():
     depth = wall()
     depth[30:120, 60:100] = 2.0
     depth[30:120, 150:200] = np.linspace(2, 3, 50)
-    surfaces = cut(depth, depth > 0, 0.04, 0.03)
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
     front, slope, back = (surfaces.labels[r, c] for r, c in ((60, 80), (60, 170), (5, 5)))
     assert len({front, slope, back}) == 3
     assert surfaces.pixels[front] == 90 * 40
