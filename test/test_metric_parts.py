@@ -10,10 +10,11 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
+from people_rig import GOOD
 
 from rgbd_kcf_tracker import Frame, Intrinsics
 from rgbd_kcf_tracker.features.windows import resampled
-from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
@@ -31,7 +32,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 CAMERA = Intrinsics(200, 200, 120, 80)
 
@@ -98,7 +99,7 @@ def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():
     depth = wall()
     depth[30:120, 60:100] = 2.0
     depth[30:120, 150:200] = np.linspace(2, 3, 50)
-    surfaces = cut(depth, depth > 0, 0.04, 0.03)
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
     front, slope, back = (surfaces.labels[r, c] for r, c in ((60, 80), (60, 170), (5, 5)))
     assert len({front, slope, back}) == 3
     assert surfaces.pixels[front] == 90 * 40
@@ -301,21 +302,6 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
 
 
 # -- the verdict ----------------------------------------------------------------------------------
-
-
-GOOD = Evidence(
-    step=0.5,
-    stride=0.1,
-    fraction=1.0,
-    height=0.0,
-    gone=0.1,
-    missing=False,
-    inland=0.0,
-    look=3.0,
-    mine=5.0,
-    rival=0.0,
-    room=0.0,
-)
 
 
 def test_evidence_speaks_for_what_fits_and_against_what_does_not():

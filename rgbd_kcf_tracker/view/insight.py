@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.perceive.colors import palette
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker
@@ -83,7 +83,7 @@ class Insight:
 
 
 COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
-    'surfaces': (cut,),
+    'surfaces': (surfaces_in,),
     'particles': (HiddenCloud.step,),
     'considered': (evidence.probability, evidence.Evidence.features),
     'gallery': (View.of, Gallery.learn),
