@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.metric.perceive.color_bands import (
     band_histograms,
     band_similarity,
 )
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, color_codes
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -159,9 +159,10 @@ def test_colours_compare_before_and_after_a_change_of_light():
     # Every pixel 1.5 times as bright, from one frame to the next.
     light = np.clip(dark * 1.5, 0, 255).astype(np.uint8)
     after = reader.read(Frame(light, depth, 1, CAMERA), 0.033).codes
-    assert np.mean(after >> 6 == before >> 6) > 0.8
+    lightness = TINTS * TINTS
+    assert np.mean(after // lightness == before // lightness) > 0.8
     still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA), 0.0).codes
-    assert np.mean(still >> 6 == before >> 6) < 0.5
+    assert np.mean(still // lightness == before // lightness) < 0.5
 
 
 def test_posterior_is_bayes_with_even_odds():
