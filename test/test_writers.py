@@ -180,6 +180,7 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
         '/tracker/roi': 2,
         '/tracker/position': 2,
         '/tracker/marker': 3,
+        '/tracker/pose': 2,
         '/tracker/image_annotated/compressed': 3,
     }
     color = found['/kinect2/hd/image_color_rect'][0]

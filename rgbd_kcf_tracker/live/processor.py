@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Protocol
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.live.answer import Answer
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
@@ -66,13 +67,11 @@ class Publishers(Protocol):
         """Whether somebody looks at the annotated image."""
         ...
 
-    def publish(self, header: Any, track: Track, size: tuple[int, int] | None) -> None:
-        """The result of a frame with this header; ``size`` is None where it could not be read."""
+    def publish(self, answer: Answer) -> None:
+        """The result of a pair."""
         ...
 
-    def publish_extras(
-        self, header: Any, track: Track, frame: Frame, intrinsics: Intrinsics | None
-    ) -> None:
+    def publish_extras(self, answer: Answer) -> None:
         """What is for people to look at, after the result is out."""
         ...
 
@@ -142,7 +141,6 @@ class Processor:
         self._notice(header, moment)
         session, image_wanted = self.session, self._publishers.image_wanted
         frame: Frame | None = None
-        size: tuple[int, int] | None = None
         track = IDLE
         decoded = begun
         if session.needs_frame or image_wanted:
@@ -150,7 +148,6 @@ class Processor:
             decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
-                size = frame.width, frame.height
                 try:
                     track = in_picture(session.process(frame), frame)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
@@ -158,7 +155,8 @@ class Processor:
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
         tracked = time.monotonic_ns()
-        self._publishers.publish(header, track, size)
+        answer = Answer(header, track, moment.time_ns, frame)
+        self._publishers.publish(answer)
         published = time.monotonic_ns()
         latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
         work = (published - capture.arrival_ns) / 1e6
@@ -175,7 +173,7 @@ class Processor:
         )
         self._last = capture, moment.time_ns
         if frame is not None:
-            self._publishers.publish_extras(header, track, frame, frame.intrinsics)
+            self._publishers.publish_extras(answer)
 
     def _unseen(self) -> Track:
         """The answer where nothing can be seen: no box, and the target is as it was."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 NEWEST, ALL = 'newest', 'all'
@@ -78,6 +79,14 @@ class NodeParameters(Parameters):
         unit='s',
         minimum=0.0,
         maximum=10.0,
+    )
+    pose_prediction: float = parameter(
+        POSE_PREDICTION_S,
+        'How long ~/pose goes on with where a hidden target is believed to be; 0 for only while it '
+        'is seen.',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
     )
     stale_after: float = parameter(
         2.0,

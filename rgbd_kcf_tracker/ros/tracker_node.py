@@ -137,7 +137,7 @@ class TrackerNode(LifecycleNode):
                 partial(self._fault, 'rejected_requests'),
             )
             warm_up(settings.variant)
-            self._outputs = TrackPublishers(self)
+            self._outputs = TrackPublishers(self, settings)
             self._processor = Processor(
                 self._session,
                 self._outputs,

@@ -1,0 +1,29 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the pipeline says of one pair of images, for whoever publishes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.track import Track
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """The answer to one pair.
+
+    Attributes:
+        header: of the colour image, as it came.
+        track: of the chosen target.
+        time_ns: the pair's time in nanoseconds, which only rises.
+        frame: what was seen; None where it was not looked at or could not be read.
+    """
+
+    header: Any
+    track: Track
+    time_ns: int
+    frame: Frame | None = None
