@@ -13,6 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
     PoseStamped,
     PoseWithCovarianceStamped,
@@ -21,6 +22,8 @@ from geometry_msgs.msg import (
 from ros_rig import Rig, running_node, scene
 from scipy.spatial.transform import Rotation
 
+from rgbd_kcf_tracker import RgbdKcfError, TrackState
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_state
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 
 pytestmark = pytest.mark.ros
@@ -53,6 +56,50 @@ def play_hidden(rig: Rig, indices: range) -> None:
         depth[y : y + 160, x : x + 120] = 1000
         rig.send_info(index)
         rig.send_images(index, color, depth / 1000)
+
+
+def test_one_stamped_answer_for_each_pair(rig: Rig) -> None:
+    """State, box and position of a moment in one message, with the image's own header."""
+    states = listen(rig, DiagnosticArray, 'state')
+    with running_node(rig, queue_policy='all', init_box=box_text(2)) as node:
+        rig.wait(lambda: node._outputs.wanted('state'))
+        rig.play(range(2, 8))
+        play_hidden(rig, range(8, 30))
+        node._session.reset()
+        rig.play([30])
+        rig.wait(lambda: len(states) == len(rig.boxes))
+    tracks = [tracks_of_state(state) for state in states]
+    assert all(len(each) == 1 for each in tracks)
+    assert [state.header for state in states] == [box.header for box in rig.boxes]
+    for (track,), box, occluded in zip(tracks, rig.boxes, rig.occluded, strict=True):
+        assert track.box == box_from_polygon(box.polygon.points)
+        assert track.occluded == occluded
+    ((seen,), (hidden,), (idle,)) = tracks[5], tracks[-2], tracks[-1]
+    assert seen.state is TrackState.TRACKING
+    assert 0.5 < seen.score <= 1
+    at = next(p.point for p in rig.positions if p.header == states[5].header)
+    assert seen.position == pytest.approx((at.x, at.y, at.z), abs=1e-3)
+    assert states[5].status[0].name == 'target'
+    assert hidden.state in (TrackState.OCCLUDED, TrackState.LOST)
+    assert hidden.predicted is not None
+    assert (idle.state, idle.box, idle.position) == (TrackState.IDLE, None, None)
+
+
+@pytest.mark.parametrize(
+    ('message', 'values'),
+    [
+        ('somewhere', {'id': '1', 'score': '0.5'}),
+        ('tracking', {'id': '1'}),
+        ('tracking', {'id': 'one', 'score': '0.5'}),
+        ('tracking', {'id': '1', 'score': '0.5', 'x': '1', 'y': '2', 'width': '3'}),
+        ('tracking', {'id': '1', 'score': '1', 'x': '1', 'y': '2', 'width': '-3', 'height': '4'}),
+    ],
+)
+def test_what_is_no_state_is_refused(message: str, values: dict[str, str]) -> None:
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    state = DiagnosticArray(status=[DiagnosticStatus(name='a', message=message, values=pairs)])
+    with pytest.raises(RgbdKcfError, match="'a' is no state of a target"):
+        tracks_of_state(state)
 
 
 def test_pose_and_twist_follow_the_walk_and_go_on_while_hidden(rig: Rig) -> None:

@@ -35,6 +35,7 @@ from rgbd_kcf_tracker.recordings import (
     open_recording,
 )
 from rgbd_kcf_tracker.recordings.encoding import millimetres
+from rgbd_kcf_tracker.recordings.messages import tracks_of_state
 from rgbd_kcf_tracker.track import Track, TrackState
 
 SEEN = Track(Box(10.25, 8.5, 20, 30.125), TrackState.TRACKING, 0.875, 2.5, (0.1, -0.2, 2.5))
@@ -180,6 +181,7 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
         '/tracker/roi': 2,
         '/tracker/position': 2,
         '/tracker/marker': 3,
+        '/tracker/state': 3,
         '/tracker/pose': 2,
         '/tracker/image_annotated/compressed': 3,
     }
@@ -204,6 +206,9 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
     assert (marker.action, gone.action) == (0, 2)
     assert marker.scale.x == pytest.approx(20 * 2.5 / CAMERA.fx)
     assert marker.scale.y == pytest.approx(30.125 * 2.5 / CAMERA.fy)
+    ((seen,), (hidden,)) = (tracks_of_state(found['/tracker/state'][i]) for i in (0, 1))
+    assert (seen.state, seen.box, seen.position) == (SEEN.state, SEEN.box, SEEN.position)
+    assert (hidden.state, hidden.box) == (HIDDEN.state, None)
     info = found['/kinect2/hd/camera_info'][0]
     assert list(info.k) == [60, 0, 31.5, 0, 61, 23.5, 0, 0, 1]
     packed = np.frombuffer(found['/tracker/image_annotated/compressed'][0].data, np.uint8)

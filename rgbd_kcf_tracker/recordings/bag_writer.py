@@ -124,6 +124,7 @@ class BagWriter:
         """Write what the tracker node publishes of the target; in space as far as that is known."""
         header, stamp, make = self._header(frame), frame.stamp_ns, self._make
         where = self._walks.update([track], stamp, frame.intrinsics, frame.pose).get(track.id)
+        self._write_tracker('state', make.state(header, [track]), stamp)
         self._write_tracker('box', make.polygon(header, track.box), stamp)
         self._write_tracker('occluded', make.occluded(track), stamp)
         self._write_tracker('roi', make.region(track.box, frame.width, frame.height), stamp)

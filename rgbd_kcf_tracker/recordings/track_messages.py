@@ -10,7 +10,7 @@ classes for publishers, rosbags' for bags.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.encoding import PackedImage, RawImage
 from rgbd_kcf_tracker.recordings.message_types import MessageTypes
+from rgbd_kcf_tracker.recordings.messages import BOX_KEYS, POSITION_KEYS, PREDICTED_KEY
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 from rgbd_kcf_tracker.track import Track
 
@@ -51,6 +52,31 @@ class TrackMessages:
         seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
         stamp = self._make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
         return self._make('std_msgs/msg/Header', stamp=stamp, frame_id=frame_id)
+
+    def state(self, header: Any, tracks: Sequence[Track]) -> Any:
+        """``diagnostic_msgs/DiagnosticArray``: all that is known of each target, one stamp for it.
+
+        Read again by :func:`~rgbd_kcf_tracker.recordings.messages.tracks_of_state`.
+
+        Args:
+            header: of the colour image: box and position are in its frame.
+            tracks: the chosen target first.
+        """
+        make = self._make
+        array = make('diagnostic_msgs/msg/DiagnosticArray', header=header)
+        for number, track in enumerate(tracks):
+            status = make(
+                'diagnostic_msgs/msg/DiagnosticStatus',
+                name='target' if number == 0 else f'target_{track.id}',
+                message=track.state.value,
+                values=[
+                    make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
+                    for key, value in _values(track)
+                ],
+            )
+            status.level = status.WARN if track.occluded else status.OK
+            array.status.append(status)
+        return array
 
     # -- in the picture ---------------------------------------------------------------------------
 
@@ -292,3 +318,17 @@ class TrackMessages:
             pose=self._pose(pose),
             covariance=covariance.ravel(),
         )
+
+
+def _values(track: Track) -> Iterator[tuple[str, str]]:
+    """What a state says of a target, by name: pixels and metres to a thousandth."""
+    yield 'id', str(track.id)
+    yield 'score', f'{track.score:.4f}'
+    if track.box is not None:
+        for name, value in zip(BOX_KEYS, track.box.as_tuple(), strict=True):
+            yield name, f'{value:.3f}'
+    place = track.predicted if track.box is None else track.position
+    if place is not None:
+        for name, metres in zip(POSITION_KEYS, place, strict=True):
+            yield name, f'{metres:.3f}'
+        yield PREDICTED_KEY, 'true' if track.box is None else 'false'

@@ -26,6 +26,7 @@ NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 topic; the defaults, two for each topic, only log a QoS that does not fit."""
 
 TOPICS = {
+    'state': 'diagnostic_msgs/msg/DiagnosticArray',
     'box': 'geometry_msgs/msg/PolygonStamped',
     'occluded': 'std_msgs/msg/Bool',
     'roi': 'sensor_msgs/msg/RegionOfInterest',
@@ -85,6 +86,8 @@ class TrackPublishers:
     def publish(self, answer: Answer) -> None:
         """The result of a frame, ``~/box`` last: who waits for it finds all others sent."""
         header, track, frame, make = answer.header, answer.track, answer.frame, self._make
+        if self.wanted('state'):
+            self._send('state', make.state(header, [track]))
         if self.wanted('occluded'):
             self._send('occluded', make.occluded(track))
         if frame is not None and self.wanted('roi'):
