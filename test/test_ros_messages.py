@@ -264,7 +264,7 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     def broken(_: Frame) -> Track:
         raise ZeroDivisionError('broken')
 
-    made.session._tracker = SimpleNamespace(update=broken)
+    made.session._targets.update = broken
     made(Capture(image, None, None, 0))
     assert [track.state for track in answers] == [TrackState.OCCLUDED]
     assert faults == ['internal error: ZeroDivisionError: broken']

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,10 +20,14 @@ from geometry_msgs.msg import (
     PoseWithCovarianceStamped,
     TwistWithCovarianceStamped,
 )
-from ros_rig import Rig, running_node, scene
+from ros_rig import Rig, running_node, scene, tracker_process
 from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import RegionOfInterest
+from std_msgs.msg import UInt32
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
 
-from rgbd_kcf_tracker import RgbdKcfError, TrackState
+from rgbd_kcf_tracker import Box, RgbdKcfError, TrackState
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_state
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
 
@@ -132,3 +137,62 @@ def test_pose_and_twist_follow_the_walk_and_go_on_while_hidden(rig: Rig) -> None
         after = [stamp_to_ns(p.header.stamp) - last for p in poses]
         assert 0 < max(after) <= 0.3e9
         assert stamp_to_ns(twists[-1].header.stamp) - last > 0.5e9
+
+
+def test_markers_show_every_target_and_go_with_it(rig: Rig) -> None:
+    arrays = listen(rig, MarkerArray, 'markers')
+    states = listen(rig, DiagnosticArray, 'state')
+    add = rig.node.create_publisher(RegionOfInterest, '/tracker/add', 10)
+    remove = rig.node.create_publisher(UInt32, '/tracker/remove', 10)
+    with running_node(rig, queue_policy='all', init_box=box_text()) as node:
+        rig.wait(lambda: node._outputs.wanted('markers') and node._outputs.wanted('state'))
+        rig.wait(lambda: add.get_subscription_count() and remove.get_subscription_count())
+        rig.play(range(10))
+        add.publish(RegionOfInterest(x_offset=240, y_offset=60, width=60, height=60))
+        rig.wait(lambda: len(node._session.others) == 1)
+        rig.play(range(10, 14))
+        remove.publish(UInt32(data=2))
+        rig.wait(lambda: not node._session.others)
+        rig.play(range(14, 16))
+        rig.wait(lambda: arrays[-1].markers[0].header == rig.boxes[-1].header)
+    assert [status.name for status in states[13].status] == ['target', 'target_2']
+    assert [status.name for status in states[-1].status] == ['target']
+    first = {marker.ns: marker for marker in arrays[9].markers}
+    assert set(first) == {'box', 'name', 'trail', 'velocity', 'covariance'}
+    assert {marker.id for marker in arrays[9].markers} == {1}
+    assert first['box'].type == Marker.CUBE
+    assert first['name'].text == '1 tracking'
+    assert first['trail'].type == Marker.LINE_STRIP
+    assert len(first['trail'].points) >= 3
+    assert first['velocity'].points[1].x > first['velocity'].points[0].x
+    assert first['covariance'].type == Marker.SPHERE
+    assert all(m.lifetime.nanosec for m in arrays[9].markers)
+    both = {marker.id for marker in arrays[13].markers}
+    assert both == {1, 2}
+    assert any(m.id == 2 and m.action == Marker.DELETE for m in arrays[14].markers)
+    assert {marker.id for marker in arrays[15].markers} == {1}
+
+
+def test_the_log_says_what_happens_and_answers_every_wrong_request(rig: Rig) -> None:
+    with tracker_process('-p', 'queue_policy:=all', '-p', f'init_box:={box_text()}') as process:
+        rig.await_listener()
+        rig.play(range(10))
+        play_hidden(rig, range(10, 40))
+        rig.play(range(40, 60))
+        for x in (1000, 2000, 3000):
+            rig.send_init(Box(x, 10, 30, 40))
+            rejected = f'{x // 1000}'
+            rig.wait(lambda n=rejected: rig.values().get('rejected_requests') == n)
+        rig.node.create_client(Trigger, '/tracker/reset').call_async(Trigger.Request())
+        rig.wait(lambda: rig.values()['state'] == 'IDLE')
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=30)[0]
+    lines = [line.partition('[tracker]: ')[2] for line in said.splitlines()]
+    x, y, width, height = (f'{v:.0f}' for v in scene(0)[2].as_tuple())
+    assert f'target 1 taken: box {x},{y},{width},{height}, 2.0 m away' in lines
+    assert 'target 1 occluded' in lines
+    assert 'target 1 found again, 2.0 m away' in lines
+    assert 'target dropped' in lines
+    for x in (1000, 2000, 3000):
+        assert sum(f'box {x},10,30,40 lies outside' in line for line in lines) == 1
+    assert len(lines) < 20

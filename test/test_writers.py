@@ -181,6 +181,7 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
         '/tracker/roi': 2,
         '/tracker/position': 2,
         '/tracker/marker': 3,
+        '/tracker/markers': 3,
         '/tracker/state': 3,
         '/tracker/pose': 2,
         '/tracker/image_annotated/compressed': 3,

@@ -20,6 +20,7 @@ class Answer:
         header: of the colour image, as it came.
         track: of the chosen target.
         time_ns: the pair's time in nanoseconds, which only rises.
+        others: tracks of the other targets that are followed.
         frame: what was seen; None where it was not looked at or could not be read.
     """
 
@@ -27,3 +28,9 @@ class Answer:
     track: Track
     time_ns: int
     frame: Frame | None = None
+    others: tuple[Track, ...] = ()
+
+    @property
+    def tracks(self) -> tuple[Track, ...]:
+        """All that is followed, the chosen one first."""
+        return (self.track, *self.others)

@@ -142,6 +142,7 @@ class Processor:
         session, image_wanted = self.session, self._publishers.image_wanted
         frame: Frame | None = None
         track = IDLE
+        others: tuple[Track, ...] = ()
         decoded = begun
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
@@ -150,12 +151,13 @@ class Processor:
             if frame is not None:
                 try:
                     track = in_picture(session.process(frame), frame)
+                    others = tuple(in_picture(other, frame) for other in session.others)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
         tracked = time.monotonic_ns()
-        answer = Answer(header, track, moment.time_ns, frame)
+        answer = Answer(header, track, moment.time_ns, frame, others)
         self._publishers.publish(answer)
         published = time.monotonic_ns()
         latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
@@ -177,12 +179,21 @@ class Processor:
 
     def _unseen(self) -> Track:
         """The answer where nothing can be seen: no box, and the target is as it was."""
-        hidden = self.session.track.state is not TrackState.IDLE
-        return Track(None, TrackState.OCCLUDED) if hidden else IDLE
+        last = self.session.track
+        hidden = last.state is not TrackState.IDLE
+        return Track(None, TrackState.OCCLUDED, id=last.id) if hidden else IDLE
 
     def choose(self, choice: Choice, oldest_s: float) -> None:
         """Start on the newest image, or the next one where the newest is old or shows nothing."""
         self.session.choose(choice)
+        self._start_at_once(oldest_s)
+
+    def add(self, choice: Choice, oldest_s: float) -> None:
+        """Likewise for a target beside the others."""
+        self.session.add(choice)
+        self._start_at_once(oldest_s)
+
+    def _start_at_once(self, oldest_s: float) -> None:
         if self._last is None or not self.session.due:
             return
         capture, time_ns = self._last

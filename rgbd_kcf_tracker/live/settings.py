@@ -54,6 +54,10 @@ class NodeParameters(Parameters):
     auto_init_far: float = parameter(
         4.5, 'Farthest distance at which auto_init looks.', unit='m', minimum=0.2, maximum=20.0
     )
+    follow_everyone: bool = parameter(
+        False,
+        'Follow everyone in view beside the chosen target, each with an id (variant metric).',
+    )
     on_time_jump: str = parameter(
         KEEP,
         'When stamps jump back (a bag that loops): keep the target, or restart from init_box.',

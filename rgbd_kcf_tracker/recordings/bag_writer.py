@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.recordings.encoding import (
 from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter
 from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.overlay import draw_track
+from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S, Walks
 from rgbd_kcf_tracker.track import Track
@@ -105,6 +106,7 @@ class BagWriter:
         self._annotate = annotate
         self._make = TrackMessages(BAG_TYPES)
         self._walks = Walks()
+        self._markers = TrackMarkers(self._make)
         self._writer = McapWriter(path, compression, overwrite)
         self.output = self._writer.output
 
@@ -123,13 +125,15 @@ class BagWriter:
     def write_track(self, frame: Frame, track: Track) -> None:
         """Write what the tracker node publishes of the target; in space as far as that is known."""
         header, stamp, make = self._header(frame), frame.stamp_ns, self._make
-        where = self._walks.update([track], stamp, frame.intrinsics, frame.pose).get(track.id)
+        wheres = self._walks.update([track], stamp, frame.intrinsics, frame.pose)
+        where = wheres.get(track.id)
         self._write_tracker('state', make.state(header, [track]), stamp)
         self._write_tracker('box', make.polygon(header, track.box), stamp)
         self._write_tracker('occluded', make.occluded(track), stamp)
         self._write_tracker('roi', make.region(track.box, frame.width, frame.height), stamp)
         self._write_tracker('position', make.position(header, where), stamp)
         self._write_tracker('marker', make.marker(header, where), stamp)
+        self._write_tracker('markers', self._markers.array(header, wheres.values()), stamp)
         if where is not None:
             if where.hidden_s <= POSE_PREDICTION_S:
                 self._write_tracker('pose', make.pose(header, where), stamp)

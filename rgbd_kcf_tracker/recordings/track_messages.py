@@ -42,10 +42,13 @@ class TrackMessages:
 
     Args:
         types: makes the messages.
+
+    Attributes:
+        types: likewise.
     """
 
     def __init__(self, types: MessageTypes) -> None:
-        self._types, self._make = types, types.make
+        self.types, self._make = types, types.make
 
     def header(self, stamp_ns: int, frame_id: str) -> Any:
         """``std_msgs/Header``."""
@@ -155,13 +158,13 @@ class TrackMessages:
         if where is None or where.predicted:
             return None
         return self._make(
-            'geometry_msgs/msg/PointStamped', header=header, point=self._point(where.position)
+            'geometry_msgs/msg/PointStamped', header=header, point=self.point(where.position)
         )
 
     def pose(self, header: Any, where: Whereabouts) -> Any:
         """``geometry_msgs/PoseStamped``: x forward along the walk, z up."""
         return self._make(
-            'geometry_msgs/msg/PoseStamped', header=header, pose=self._pose(where.heading)
+            'geometry_msgs/msg/PoseStamped', header=header, pose=self.pose_of(where.heading)
         )
 
     def pose_with_covariance(self, header: Any, where: Whereabouts) -> Any | None:
@@ -182,7 +185,7 @@ class TrackMessages:
         if where.velocity is None or where.velocity_covariance is None:
             return None
         make = self._make
-        twist = make('geometry_msgs/msg/Twist', linear=self._vector(where.velocity))
+        twist = make('geometry_msgs/msg/Twist', linear=self.vector(where.velocity))
         covariance = np.zeros((6, 6))
         covariance[:3, :3] = where.velocity_covariance
         covariance[3:, 3:] = TURNING_VARIANCE * np.eye(3)
@@ -207,11 +210,11 @@ class TrackMessages:
             if where.covariance is not None:
                 hypothesis.pose = self._uncertain_pose(where.heading, where)
             else:
-                hypothesis.pose.pose = self._pose(where.heading)
+                hypothesis.pose.pose = self.pose_of(where.heading)
             box = make(
                 'vision_msgs/msg/BoundingBox3D',
-                center=self._pose(Pose(where.camera.rotation, where.position)),
-                size=self._vector(where.size),
+                center=self.pose_of(Pose(where.camera.rotation, where.position)),
+                size=self.vector(where.size),
             )
             found.append(
                 make(
@@ -238,8 +241,8 @@ class TrackMessages:
             marker.action = marker.DELETE
             return marker
         marker.action = marker.ADD
-        marker.pose = self._pose(Pose(where.camera.rotation, where.position))
-        marker.scale = self._vector(where.size)
+        marker.pose = self.pose_of(Pose(where.camera.rotation, where.position))
+        marker.scale = self.vector(where.size)
         marker.color = make('std_msgs/msg/ColorRGBA', r=0.1, g=0.8, b=0.3, a=0.5)
         marker.lifetime = make('builtin_interfaces/msg/Duration', nanosec=MARKER_LIFETIME_NS)
         return marker
@@ -271,7 +274,7 @@ class TrackMessages:
             encoding=raw.encoding,
             is_bigendian=raw.is_bigendian,
             step=raw.step,
-            data=self._types.octets(raw.data),
+            data=self.types.octets(raw.data),
         )
 
     def compressed_image(self, header: Any, packed: PackedImage) -> Any:
@@ -280,7 +283,7 @@ class TrackMessages:
             'sensor_msgs/msg/CompressedImage',
             header=header,
             format=packed.format,
-            data=self._types.octets(packed.data),
+            data=self.types.octets(packed.data),
         )
 
     # -- parts ------------------------------------------------------------------------------------
@@ -292,19 +295,22 @@ class TrackMessages:
         )
         return make('vision_msgs/msg/ObjectHypothesisWithPose', hypothesis=hypothesis)
 
-    def _point(self, at: FloatArray) -> Any:
+    def point(self, at: FloatArray) -> Any:
+        """``geometry_msgs/Point``."""
         x, y, z = (float(v) for v in at)
         return self._make('geometry_msgs/msg/Point', x=x, y=y, z=z)
 
-    def _vector(self, of: FloatArray) -> Any:
+    def vector(self, of: FloatArray) -> Any:
+        """``geometry_msgs/Vector3``."""
         x, y, z = (float(v) for v in of)
         return self._make('geometry_msgs/msg/Vector3', x=x, y=y, z=z)
 
-    def _pose(self, pose: Pose) -> Any:
+    def pose_of(self, pose: Pose) -> Any:
+        """``geometry_msgs/Pose``."""
         x, y, z, w = pose.quaternion
         return self._make(
             'geometry_msgs/msg/Pose',
-            position=self._point(pose.translation),
+            position=self.point(pose.translation),
             orientation=self._make('geometry_msgs/msg/Quaternion', x=x, y=y, z=z, w=w),
         )
 
@@ -315,7 +321,7 @@ class TrackMessages:
         covariance[3:, 3:] = where.heading_sigma**2 * along + TILT_VARIANCE * (np.eye(3) - along)
         return self._make(
             'geometry_msgs/msg/PoseWithCovariance',
-            pose=self._pose(pose),
+            pose=self.pose_of(pose),
             covariance=covariance.ravel(),
         )
 

@@ -14,6 +14,7 @@ from rclpy.qos import QoSProfile
 from rgbd_kcf_tracker.live.annotate import annotated
 from rgbd_kcf_tracker.live.answer import Answer
 from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Walks
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message
@@ -35,13 +36,14 @@ TOPICS = {
     'pose_with_covariance': 'geometry_msgs/msg/PoseWithCovarianceStamped',
     'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
     'marker': 'visualization_msgs/msg/Marker',
+    'markers': 'visualization_msgs/msg/MarkerArray',
 }
 DETECTIONS = {
     'detections': 'vision_msgs/msg/Detection2DArray',
     'detections3d': 'vision_msgs/msg/Detection3DArray',
 }
 PICTURES = {'image_annotated': 'sensor_msgs/msg/Image'}
-IN_SPACE = ('position', 'pose', 'pose_with_covariance', 'twist', 'detections3d', 'marker')
+IN_SPACE = frozenset(TOPICS) - {'state', 'box', 'occluded', 'roi'} | {'detections3d'}
 
 
 class TrackPublishers:
@@ -57,6 +59,7 @@ class TrackPublishers:
         self._pose_prediction = settings.pose_prediction
         self._make = TrackMessages(ROS_TYPES)
         self._walks = Walks()
+        self._markers = TrackMarkers(self._make)
         self._marked = False
         topics = dict.fromkeys(TOPICS, RESULT_DEPTH) | dict.fromkeys(PICTURES, IMAGE_DEPTH)
         if ROS_TYPES.has('vision_msgs'):
@@ -87,13 +90,13 @@ class TrackPublishers:
         """The result of a frame, ``~/box`` last: who waits for it finds all others sent."""
         header, track, frame, make = answer.header, answer.track, answer.frame, self._make
         if self.wanted('state'):
-            self._send('state', make.state(header, [track]))
+            self._send('state', make.state(header, answer.tracks))
         if self.wanted('occluded'):
             self._send('occluded', make.occluded(track))
         if frame is not None and self.wanted('roi'):
             self._send('roi', make.region(track.box, frame.width, frame.height))
         if self.wanted('detections'):
-            self._send('detections', make.detections(header, [track]))
+            self._send('detections', make.detections(header, answer.tracks))
         if self.wanted(*IN_SPACE):
             self._publish_in_space(answer)
         self._send('box', make.polygon(header, track.box))
@@ -101,7 +104,7 @@ class TrackPublishers:
     def _publish_in_space(self, answer: Answer) -> None:
         header, frame, make = answer.header, answer.frame, self._make
         wheres = self._walks.update(
-            [answer.track],
+            answer.tracks,
             answer.time_ns,
             None if frame is None else frame.intrinsics,
             None if frame is None else frame.pose,
@@ -112,6 +115,8 @@ class TrackPublishers:
         if self.wanted('marker') and (where is not None or self._marked):
             self._send('marker', make.marker(header, where))
             self._marked = where is not None
+        if self.wanted('markers'):
+            self._send('markers', self._markers.array(header, wheres.values()))
         if where is None:
             return
         if self.wanted('position'):
