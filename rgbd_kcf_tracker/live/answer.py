@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track
 
 
@@ -20,6 +21,8 @@ class Answer:
         header: of the colour image, as it came.
         track: of the chosen target.
         time_ns: the pair's time in nanoseconds, which only rises.
+        place: the camera's pose in the frame in which results go out; None where that is unknown,
+            or is the camera's own.
         others: tracks of the other targets that are followed.
         frame: what was seen; None where it was not looked at or could not be read.
     """
@@ -29,6 +32,7 @@ class Answer:
     time_ns: int
     frame: Frame | None = None
     others: tuple[Track, ...] = ()
+    place: Pose | None = None
 
     @property
     def tracks(self) -> tuple[Track, ...]:

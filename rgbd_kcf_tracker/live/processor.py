@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.live.answer import Answer
+from rgbd_kcf_tracker.live.places import CameraPlaces, Places
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
@@ -103,6 +104,7 @@ class Processor:
         now_ns: the node's clock, for the age of a result.
         fault: told of each fault by kind and in words.
         color_transport, depth_transport: how the images are packed.
+        places: where the camera is, None where nobody tells.
     """
 
     def __init__(
@@ -115,12 +117,14 @@ class Processor:
         *,
         color_transport: str = RAW,
         depth_transport: str = RAW,
+        places: CameraPlaces | None = None,
     ) -> None:
         self.session = session
         self._publishers = publishers
         self._statistics = statistics
         self._now_ns = now_ns
         self._fault = fault
+        self._places = places
         self._timeline = Timeline()
         self._last: tuple[Capture, int] | None = None
         self._frame_id: str | None = None
@@ -143,12 +147,16 @@ class Processor:
         frame: Frame | None = None
         track = IDLE
         others: tuple[Track, ...] = ()
+        places = Places()
         decoded = begun
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
             decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
+                if self._places is not None:
+                    places = self._places.at(header)
+                    frame = replace(frame, pose=places.fixed)
                 try:
                     track = in_picture(session.process(frame), frame)
                     others = tuple(in_picture(other, frame) for other in session.others)
@@ -156,8 +164,12 @@ class Processor:
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
+                if self._places is not None:
+                    places = self._places.judged(places, session.camera_motion)
+                    if places.fixed is None:
+                        frame = replace(frame, pose=None)
         tracked = time.monotonic_ns()
-        answer = Answer(header, track, moment.time_ns, frame, others)
+        answer = Answer(header, track, moment.time_ns, frame, others, places.target)
         self._publishers.publish(answer)
         published = time.monotonic_ns()
         latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
@@ -259,6 +271,8 @@ class Processor:
         if moment.restarted:
             self._restarts, self._steady = self._restarts + 1, 0
             self._statistics.set('restarts', self._restarts)
+            if self._places is not None:
+                self._places.forget()
             if self.on_restart is not None:
                 self.on_restart()
         if self._frame_id is not None and header.frame_id != self._frame_id:

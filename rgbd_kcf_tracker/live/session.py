@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.live.story import Story, taken
 from rgbd_kcf_tracker.parameters import Parameters
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import create_tracker
@@ -109,6 +110,11 @@ class Session:
     def following(self) -> bool:
         """Whether anybody is followed."""
         return self._chosen is not None or bool(self._added) or self._targets.everyone
+
+    @property
+    def camera_motion(self) -> Pose | None:
+        """How the camera seems to have moved in the last frame; None for not at all, or unknown."""
+        return None if self._targets.metric is None else self._targets.metric.camera_motion
 
     @property
     def needs_frame(self) -> bool:

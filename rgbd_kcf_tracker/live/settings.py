@@ -21,6 +21,7 @@ NEWEST, ALL = 'newest', 'all'
 RAW, COMPRESSED, COMPRESSED_DEPTH = 'raw', 'compressed', 'compressedDepth'
 AUTO, BEST_EFFORT, RELIABLE = 'auto', 'best_effort', 'reliable'
 KEEP, RESTART = 'keep', 'restart'
+OFF, TARGET = 'off', 'target'
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,31 @@ class NodeParameters(Parameters):
         minimum=0.0,
         maximum=60.0,
     )
+    target_frame: str = parameter(
+        '',
+        'Frame in which positions, poses, velocities, markers and 3D detections go out, by TF '
+        "(base_link, map); empty for the camera's own.",
+    )
+    fixed_frame: str = parameter(
+        '',
+        'Frame that does not move, by TF (odom), in which a moving camera keeps the targets in '
+        "mind; empty for what the picture tells of the camera's motion.",
+    )
+    tf_wait: float = parameter(
+        0.1,
+        'How long a pair waits for TF that is a little behind it.',
+        unit='s',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    publish_tf: str = parameter(
+        OFF,
+        'Whom to publish as a TF frame: the chosen target, or all.',
+        choices=(OFF, TARGET, ALL),
+    )
+    tf_name: str = parameter(
+        'target', "Name of the chosen target's TF frame; the others' is it with _<id>."
+    )
     stale_after: float = parameter(
         2.0,
         'Time without images after which diagnostics report the camera as silent.',
@@ -144,6 +170,11 @@ READ_ONLY = frozenset(
         'reliability',
         'qos_depth',
         'autostart',
+        'target_frame',
+        'fixed_frame',
+        'tf_wait',
+        'publish_tf',
+        'tf_name',
     }
 )
 """Node parameters that are fixed at start: they decide how the node is wired."""

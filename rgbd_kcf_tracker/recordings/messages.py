@@ -93,5 +93,10 @@ def _track_of(status: Any) -> Track:
 
 def stamp_of(msg: Any) -> int:
     """Nanoseconds of a message's header."""
-    stamp = msg.header.stamp
+    return header_stamp(msg.header)
+
+
+def header_stamp(header: Any) -> int:
+    """Nanoseconds of a header."""
+    stamp = header.stamp
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -227,6 +227,20 @@ class TrackMessages:
             )
         return make('vision_msgs/msg/Detection3DArray', header=header, detections=found)
 
+    def transform(self, header: Any, child: str, where: Whereabouts) -> Any:
+        """``geometry_msgs/TransformStamped`` of the frame ``child``: x along the walk, z up."""
+        pose = self.pose_of(where.heading)
+        return self._make(
+            'geometry_msgs/msg/TransformStamped',
+            header=header,
+            child_frame_id=child,
+            transform=self._make(
+                'geometry_msgs/msg/Transform',
+                translation=self.vector(where.position),
+                rotation=pose.orientation,
+            ),
+        )
+
     def marker(self, header: Any, where: Whereabouts | None) -> Any:
         """``visualization_msgs/Marker``: a box about the target, or the order to remove it.
 

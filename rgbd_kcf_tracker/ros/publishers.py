@@ -13,11 +13,13 @@ from rclpy.qos import QoSProfile
 
 from rgbd_kcf_tracker.live.annotate import annotated
 from rgbd_kcf_tracker.live.answer import Answer
-from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.live.settings import ALL, OFF, NodeParameters
+from rgbd_kcf_tracker.recordings.messages import header_stamp
 from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Walks
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message
+from rgbd_kcf_tracker.ros.transforms import TargetFrames
 
 RESULT_DEPTH = 100
 """History of the result topics: three seconds at 30 Hz for a consumer that pauses."""
@@ -51,12 +53,17 @@ class TrackPublishers:
 
     Args:
         node: whose they are.
-        settings: how long a prediction is a pose.
+        settings: in which frame results go out, how long a prediction is a pose, and who becomes
+            a TF frame.
+
+    Raises:
+        ParameterError: where they need what is not installed.
     """
 
     def __init__(self, node: LifecycleNode, settings: NodeParameters) -> None:
         self._node = node
-        self._pose_prediction = settings.pose_prediction
+        self._settings, self._frame_id = settings, settings.target_frame
+        self._frames = TargetFrames(node, settings) if settings.publish_tf != OFF else None
         self._make = TrackMessages(ROS_TYPES)
         self._walks = Walks()
         self._markers = TrackMarkers(self._make)
@@ -97,18 +104,24 @@ class TrackPublishers:
             self._send('roi', make.region(track.box, frame.width, frame.height))
         if self.wanted('detections'):
             self._send('detections', make.detections(header, answer.tracks))
-        if self.wanted(*IN_SPACE):
+        if self._frames is not None or self.wanted(*IN_SPACE):
             self._publish_in_space(answer)
         self._send('box', make.polygon(header, track.box))
 
     def _publish_in_space(self, answer: Answer) -> None:
-        header, frame, make = answer.header, answer.frame, self._make
+        frame, make = answer.frame, self._make
         wheres = self._walks.update(
             answer.tracks,
             answer.time_ns,
             None if frame is None else frame.intrinsics,
             None if frame is None else frame.pose,
         )
+        header = answer.header
+        if self._frame_id not in ('', header.frame_id):
+            if answer.place is None:
+                return  # better nothing than something in a wrong frame
+            header = make.header(header_stamp(header), self._frame_id)
+            wheres = {who: where.seen_from(answer.place) for who, where in wheres.items()}
         where = wheres.get(answer.track.id)
         if self.wanted('detections3d'):
             self._send('detections3d', make.detections3d(header, wheres.values()))
@@ -117,6 +130,15 @@ class TrackPublishers:
             self._marked = where is not None
         if self.wanted('markers'):
             self._send('markers', self._markers.array(header, wheres.values()))
+        near = {
+            who: where
+            for who, where in wheres.items()
+            if where.hidden_s <= self._settings.pose_prediction
+        }
+        if self._frames is not None:
+            if self._settings.publish_tf != ALL:
+                near = {who: w for who, w in near.items() if who == answer.track.id}
+            self._frames.send(make, header, near.values(), answer.track.id)
         if where is None:
             return
         if self.wanted('position'):
@@ -125,7 +147,7 @@ class TrackPublishers:
             self._send('pose_with_covariance', make.pose_with_covariance(header, where))
         if self.wanted('twist'):
             self._send('twist', make.twist(header, where))
-        if self.wanted('pose') and where.hidden_s <= self._pose_prediction:
+        if self.wanted('pose') and answer.track.id in near:
             self._send('pose', make.pose(header, where))
 
     def publish_extras(self, answer: Answer) -> None:

@@ -36,6 +36,7 @@ from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
 from rgbd_kcf_tracker.ros.requests import REJECTED, Requests
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
+from rgbd_kcf_tracker.ros.transforms import Transforms
 from rgbd_kcf_tracker.track import TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
 
@@ -68,6 +69,7 @@ class TrackerNode(LifecycleNode):
         self._worker: Worker[Capture] | None = None
         self._intake: Intake | None = None
         self._inputs: Subscriptions | None = None
+        self._transforms: Transforms | None = None
         self._reset_service: Any = None
         self._refusals = Allowance(MOST_REFUSALS, REFUSALS_A_SECOND)
         self._logged: dict[str, float] = {}
@@ -143,6 +145,8 @@ class TrackerNode(LifecycleNode):
             self._session.everyone = settings.follow_everyone
             warm_up(settings.variant)
             self._outputs = TrackPublishers(self, settings)
+            if settings.target_frame or settings.fixed_frame:
+                self._transforms = Transforms(self, settings, self._fault)
             self._processor = Processor(
                 self._session,
                 self._outputs,
@@ -151,6 +155,7 @@ class TrackerNode(LifecycleNode):
                 self._fault,
                 color_transport=settings.color_transport,
                 depth_transport=settings.depth_transport,
+                places=self._transforms,
             )
             self._requests = Requests(
                 self._processor, lambda: self._settings, self._in_worker, self._fault
@@ -244,6 +249,9 @@ class TrackerNode(LifecycleNode):
         if self._outputs is not None:
             self._outputs.destroy()
             self._outputs = None
+        if self._transforms is not None:
+            self._transforms.destroy()
+            self._transforms = None
         if self._reset_service is not None:
             self.destroy_service(self._reset_service)
             self._reset_service = None
