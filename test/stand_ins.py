@@ -13,6 +13,7 @@ from typing import Any
 
 import geometry_msgs.msg
 import numpy as np
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped, Vector3
 from rclpy.node import Node
 from scipy.spatial.transform import Rotation
@@ -51,6 +52,30 @@ def vision_messages() -> ModuleType:
     define('Detection3D', header=Header, results=list, bbox=box3, id=str)
     define('Detection2DArray', header=Header, detections=list)
     define('Detection3DArray', header=Header, detections=list)
+    return module
+
+
+def foxglove_messages() -> ModuleType:
+    """``foxglove_msgs.msg``, of a release that has fields which we do not fill."""
+    module = ModuleType('foxglove_msgs.msg')
+
+    def define(name: str, **fields: Callable[[], Any]) -> type:
+        made = message(**fields)
+        setattr(module, name, made)
+        return made
+
+    color = define('Color', r=float, g=float, b=float, a=float)
+    point = define('Point2', x=float, y=float)
+    line = define(
+        'PointsAnnotation', timestamp=Time, type=int, points=list, outline_color=color,
+        outline_colors=list, fill_color=color, thickness=float, metadata=list,
+    )  # fmt: skip
+    line.LINE_LOOP = 2  # type: ignore[attr-defined]
+    define(
+        'TextAnnotation', timestamp=Time, position=point, text=str, font_size=float,
+        text_color=color, background_color=color, metadata=list,
+    )  # fmt: skip
+    define('ImageAnnotations', timestamp=Time, circles=list, points=list, texts=list, metadata=list)
     return module
 
 

@@ -24,12 +24,12 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
-from rgbd_kcf_tracker.live.annotate import annotated
 from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor, in_picture
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_from_info
+from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Walks
 from rgbd_kcf_tracker.ros.messages import (
@@ -162,7 +162,7 @@ def test_detections(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_annotated_is_a_copy_with_something_on_it(state: TrackState) -> None:
     image = np.full((120, 160, 3), 90, np.uint8)
     box = Box(-20, 10, 60, 200) if state is TrackState.TRACKING else None
-    out = annotated(image, Track(box, state, 0.5, 1.5))
+    out = draw_track(image, Track(box, state, 0.5, 1.5))
     assert (image == 90).all()
     assert (out != 90).any()
     assert out.shape == image.shape

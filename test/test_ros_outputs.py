@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,16 +22,19 @@ from geometry_msgs.msg import (
     PoseWithCovarianceStamped,
     TwistWithCovarianceStamped,
 )
+from rclpy.lifecycle import LifecycleNode
 from ros_rig import Rig, running_node, scene, tracker_process
 from scipy.spatial.transform import Rotation
-from sensor_msgs.msg import RegionOfInterest
+from sensor_msgs.msg import CameraInfo, CompressedImage, RegionOfInterest
+from stand_ins import foxglove_messages, vision_messages
 from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rgbd_kcf_tracker import Box, RgbdKcfError, TrackState
+from rgbd_kcf_tracker.recordings.images import decode_compressed_color
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_state
-from rgbd_kcf_tracker.ros.messages import stamp_to_ns
+from rgbd_kcf_tracker.ros.messages import RosTypes, stamp_to_ns
 
 pytestmark = pytest.mark.ros
 
@@ -196,3 +201,62 @@ def test_the_log_says_what_happens_and_answers_every_wrong_request(rig: Rig) -> 
     for x in (1000, 2000, 3000):
         assert sum(f'box {x},10,30,40 lies outside' in line for line in lines) == 1
     assert len(lines) < 20
+
+
+def test_pictures_are_made_while_somebody_looks(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all', init_box=box_text(), jpeg_quality=60) as node:
+        rig.play(range(2))
+        assert not node._outputs.image_wanted
+        packed = listen(rig, CompressedImage, 'image_annotated/compressed')
+        cameras = listen(rig, CameraInfo, 'camera_info')
+        rig.wait(lambda: node._outputs.wanted('image_annotated/compressed', 'camera_info'))
+        rig.wait(lambda: node._outputs.image_wanted and node._outputs.wanted('camera_info'))
+        assert not node._outputs.wanted('image_annotated')
+        rig.play(range(2, 6))
+        rig.wait(lambda: packed and packed[-1].header == rig.boxes[-1].header)
+    drawn = decode_compressed_color(packed[-1])
+    plain = scene(5)[0]
+    assert drawn.shape == plain.shape
+    assert packed[-1].format == 'bgr8; jpeg compressed bgr8'
+    outside = np.abs(drawn[150:].astype(int) - plain[150:]).mean()
+    assert 0 < outside < 12
+    assert len(packed[-1].data) < plain.size / 4
+    assert cameras[-1].header == packed[-1].header
+    assert (cameras[-1].width, cameras[-1].k[0]) == (320, 290.0)
+
+
+def test_foxglove_and_vision_messages_where_they_are_installed(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Messages of packages that are not here, as the node would send them."""
+    sent: dict[str, list[Any]] = {}
+    original = LifecycleNode.create_lifecycle_publisher
+
+    def create(node: Any, kind: Any, topic: str, *rest: Any, **named: Any) -> Any:
+        if kind.__module__.startswith('stand_ins'):
+            kept = sent.setdefault(topic, [])
+            return SimpleNamespace(publish=kept.append, get_subscription_count=lambda: 1)
+        return original(node, kind, topic, *rest, **named)
+
+    monkeypatch.setattr(LifecycleNode, 'create_lifecycle_publisher', create)
+    monkeypatch.setattr(LifecycleNode, 'destroy_lifecycle_publisher', lambda *_: None)
+    for name, module in (
+        ('vision_msgs', vision_messages()),
+        ('foxglove_msgs', foxglove_messages()),
+    ):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+        monkeypatch.setitem(sys.modules, f'{name}.msg', module)
+    monkeypatch.setattr('rgbd_kcf_tracker.ros.publishers.ROS_TYPES', RosTypes())
+    with running_node(rig, queue_policy='all', init_box=box_text()):
+        rig.play(range(4))
+        rig.wait(lambda: len(sent['~/annotations']) == 4)
+    (flat,) = sent['~/detections'][-1].detections
+    (solid,) = sent['~/detections3d'][-1].detections
+    overlay = sent['~/annotations'][-1]
+    box, at = rig.box(), rig.positions[-1].point
+    assert flat.id == solid.id == '1'
+    assert flat.bbox.center.position.x == pytest.approx(box.cx, abs=0.01)
+    assert solid.bbox.center.position == at
+    assert np.reshape(solid.results[0].pose.covariance, (6, 6))[0, 0] > 0
+    assert overlay.points[0].points[0].x == pytest.approx(box.x, abs=0.01)
+    assert overlay.points[0].type == 2

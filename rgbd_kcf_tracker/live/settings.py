@@ -118,6 +118,9 @@ class NodeParameters(Parameters):
     tf_name: str = parameter(
         'target', "Name of the chosen target's TF frame; the others' is it with _<id>."
     )
+    jpeg_quality: int = parameter(
+        80, 'Quality of ~/image_annotated/compressed.', unit='%', minimum=1, maximum=100
+    )
     stale_after: float = parameter(
         2.0,
         'Time without images after which diagnostics report the camera as silent.',

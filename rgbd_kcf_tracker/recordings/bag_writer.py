@@ -18,8 +18,9 @@ from rgbd_kcf_tracker.recordings.encoding import (
     encode_compressed_color,
     encode_depth,
 )
+from rgbd_kcf_tracker.recordings.foxglove import DEFINITIONS, image_annotations
 from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
+from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES, register
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
@@ -104,6 +105,7 @@ class BagWriter:
         self._tracker = tracker.rstrip('/')
         self._depth_encoding = depth_encoding
         self._annotate = annotate
+        register(DEFINITIONS)
         self._make = TrackMessages(BAG_TYPES)
         self._walks = Walks()
         self._markers = TrackMarkers(self._make)
@@ -133,6 +135,8 @@ class BagWriter:
         self._write_tracker('roi', make.region(track.box, frame.width, frame.height), stamp)
         self._write_tracker('position', make.position(header, where), stamp)
         self._write_tracker('marker', make.marker(header, where), stamp)
+        overlay = image_annotations(BAG_TYPES, header, [track])
+        self._write_tracker('annotations', overlay, stamp)
         self._write_tracker('markers', self._markers.array(header, wheres.values()), stamp)
         if where is not None:
             if where.hidden_s <= POSE_PREDICTION_S:
@@ -140,6 +144,9 @@ class BagWriter:
             covariance = make.pose_with_covariance(header, where)
             self._write_tracker('pose_with_covariance', covariance, stamp)
             self._write_tracker('twist', make.twist(header, where), stamp)
+        if frame.intrinsics is not None:
+            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            self._write_tracker('camera_info', info, stamp)
         if self._annotate:
             packed = encode_compressed_color(draw_track(frame.color, track), quality=80)
             image = make.compressed_image(header, packed)

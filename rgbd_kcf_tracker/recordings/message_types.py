@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Protocol
 
@@ -41,6 +41,18 @@ class BagTypes:
 
 
 BAG_TYPES = BagTypes()
+
+
+def register(definitions: Mapping[str, str]) -> None:
+    """Let :data:`BAG_TYPES` make messages of further types, by name and text."""
+    new = {kind: text for kind, text in definitions.items() if kind not in typestore().types}
+    if new:
+        from rosbags.typesys import get_types_from_msg
+
+        found = {}
+        for kind, text in new.items():
+            found.update(get_types_from_msg(text, kind))
+        typestore().register(found)
 
 
 @cache

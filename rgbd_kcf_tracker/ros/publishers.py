@@ -5,16 +5,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
 
-from rgbd_kcf_tracker.live.annotate import annotated
 from rgbd_kcf_tracker.live.answer import Answer
 from rgbd_kcf_tracker.live.settings import ALL, OFF, NodeParameters
+from rgbd_kcf_tracker.recordings.encoding import encode_compressed_color
+from rgbd_kcf_tracker.recordings.foxglove import ANNOTATIONS, image_annotations
 from rgbd_kcf_tracker.recordings.messages import header_stamp
+from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
 from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Walks
@@ -39,13 +42,17 @@ TOPICS = {
     'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
     'marker': 'visualization_msgs/msg/Marker',
     'markers': 'visualization_msgs/msg/MarkerArray',
+    'camera_info': 'sensor_msgs/msg/CameraInfo',
 }
 DETECTIONS = {
     'detections': 'vision_msgs/msg/Detection2DArray',
     'detections3d': 'vision_msgs/msg/Detection3DArray',
 }
-PICTURES = {'image_annotated': 'sensor_msgs/msg/Image'}
-IN_SPACE = frozenset(TOPICS) - {'state', 'box', 'occluded', 'roi'} | {'detections3d'}
+ANNOTATED, COMPRESSED = 'image_annotated', 'image_annotated/compressed'
+PICTURES = {ANNOTATED: 'sensor_msgs/msg/Image', COMPRESSED: 'sensor_msgs/msg/CompressedImage'}
+OVERLAY = {'annotations': ANNOTATIONS}
+IN_PICTURE = {'state', 'box', 'occluded', 'roi', 'camera_info'}
+IN_SPACE = frozenset(TOPICS) - IN_PICTURE | {'detections3d'}
 
 
 class TrackPublishers:
@@ -53,25 +60,28 @@ class TrackPublishers:
 
     Args:
         node: whose they are.
-        settings: in which frame results go out, how long a prediction is a pose, and who becomes
-            a TF frame.
+        settings: gives the parameters as they stand: in which frame results go out, how long a
+            prediction is a pose, and who becomes a TF frame.
 
     Raises:
         ParameterError: where they need what is not installed.
     """
 
-    def __init__(self, node: LifecycleNode, settings: NodeParameters) -> None:
+    def __init__(self, node: LifecycleNode, settings: Callable[[], NodeParameters]) -> None:
         self._node = node
-        self._settings, self._frame_id = settings, settings.target_frame
-        self._frames = TargetFrames(node, settings) if settings.publish_tf != OFF else None
+        self._settings, fixed = settings, settings()
+        self._frame_id, self._everyones_frames = fixed.target_frame, fixed.publish_tf == ALL
+        self._frames = TargetFrames(node, fixed) if fixed.publish_tf != OFF else None
         self._make = TrackMessages(ROS_TYPES)
         self._walks = Walks()
         self._markers = TrackMarkers(self._make)
         self._marked = False
         topics = dict.fromkeys(TOPICS, RESULT_DEPTH) | dict.fromkeys(PICTURES, IMAGE_DEPTH)
-        if ROS_TYPES.has('vision_msgs'):
-            topics |= dict.fromkeys(DETECTIONS, RESULT_DEPTH)
-        kinds = TOPICS | DETECTIONS | PICTURES
+        for optional in (DETECTIONS, OVERLAY):
+            package = next(iter(optional.values())).partition('/')[0]
+            if ROS_TYPES.has(package):
+                topics |= dict.fromkeys(optional, RESULT_DEPTH)
+        kinds = TOPICS | DETECTIONS | OVERLAY | PICTURES
         self._all = {
             topic: node.create_lifecycle_publisher(
                 ROS_TYPES.type(kinds[topic]),
@@ -91,7 +101,7 @@ class TrackPublishers:
     @property
     def image_wanted(self) -> bool:
         """Whether somebody subscribes to the annotated image."""
-        return self.wanted('image_annotated')
+        return self.wanted(*PICTURES)
 
     def publish(self, answer: Answer) -> None:
         """The result of a frame, ``~/box`` last: who waits for it finds all others sent."""
@@ -133,10 +143,10 @@ class TrackPublishers:
         near = {
             who: where
             for who, where in wheres.items()
-            if where.hidden_s <= self._settings.pose_prediction
+            if where.hidden_s <= self._settings().pose_prediction
         }
         if self._frames is not None:
-            if self._settings.publish_tf != ALL:
+            if not self._everyones_frames:
                 near = {who: w for who, w in near.items() if who == answer.track.id}
             self._frames.send(make, header, near.values(), answer.track.id)
         if where is None:
@@ -152,9 +162,27 @@ class TrackPublishers:
 
     def publish_extras(self, answer: Answer) -> None:
         """What is for people to look at, after the result is out."""
-        if answer.frame is not None and self.image_wanted:
-            picture = annotated(answer.frame.color, answer.track)
-            self._send('image_annotated', image_message(answer.header, picture, 'bgr8'))
+        header, frame, make = answer.header, answer.frame, self._make
+        if frame is None:
+            return
+        if self.wanted('annotations'):
+            self._send('annotations', image_annotations(ROS_TYPES, header, answer.tracks))
+        if frame.intrinsics is not None and self.wanted('camera_info'):
+            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            self._send('camera_info', info)
+        if not self.image_wanted:
+            return
+        if answer.others:
+            tracks = {track.id: track for track in answer.tracks if track.id}
+            picture = draw_tracks(frame.color, tracks)
+        else:
+            picture = draw_track(frame.color, answer.track)
+        if self.wanted(ANNOTATED):
+            self._send(ANNOTATED, image_message(header, picture, 'bgr8'))
+        if self.wanted(COMPRESSED):
+            quality = self._settings().jpeg_quality
+            packed = encode_compressed_color(picture, quality=quality)
+            self._send(COMPRESSED, make.compressed_image(header, packed))
 
     def _send(self, topic: str, message: Any | None) -> None:
         if message is not None:

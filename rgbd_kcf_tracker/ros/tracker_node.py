@@ -144,7 +144,7 @@ class TrackerNode(LifecycleNode):
             )
             self._session.everyone = settings.follow_everyone
             warm_up(settings.variant)
-            self._outputs = TrackPublishers(self, settings)
+            self._outputs = TrackPublishers(self, lambda: self._settings)
             if settings.target_frame or settings.fixed_frame:
                 self._transforms = Transforms(self, settings, self._fault)
             self._processor = Processor(
