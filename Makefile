@@ -21,7 +21,7 @@ help: ## say what can be made
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
 demo: $(VENV)/.installed ## simulate a recording, run both nodes over it, show the result in demo/
-	$(BIN)/python -m rgbd_kcf_tracker.bench.demo demo
+	$(BIN)/python -m rgbd_kcf_tracker.bench.demo demo --overwrite
 
 test: $(VENV)/.installed-test ## run the whole suite
 	$(BIN)/python -m pytest $(PYTEST)

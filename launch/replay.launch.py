@@ -8,18 +8,15 @@
 Every pair is processed, in lock-step unless told otherwise; the time is that of the recording.
 """
 
-from pathlib import Path
-
-from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, Shutdown
+from launch.actions import IncludeLaunchDescription, Shutdown
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
+from rgbd_kcf_tracker.ros.launching import CONFIG, declared
 
-SHARE = Path(get_package_share_directory('rgbd_kcf_tracker'))
 ARGUMENTS = {
     'bag': (None, 'The recording: .mcap, rosbag2 folder, ROS 1 .bag or sequence folder.'),
     'camera': ('kinect2_qhd', 'Profile of config/cameras.yaml: what the recorded topics are.'),
@@ -28,7 +25,7 @@ ARGUMENTS = {
     'info_topic': ('', "Recorded CameraInfo topic, instead of the profile's."),
     'init_box': ('', 'Target in the first image, x,y,width,height.'),
     'variant': ('', 'Which tracker; empty for the default.'),
-    'params_file': (str(SHARE / 'config' / 'replayed.yaml'), 'Parameters of the tracker node.'),
+    'params_file': (str(CONFIG / 'replayed.yaml'), 'Parameters of the tracker node.'),
     'rate': ('1.0', 'Speed, without lock-step.'),
     'loop': ('false', 'Begin again at the end.'),
     'lockstep': ('true', 'Wait for the answer to each frame.'),
@@ -37,13 +34,9 @@ ARGUMENTS = {
 
 def generate_launch_description() -> LaunchDescription:
     """Both nodes."""
-    declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        for name, (default, text) in ARGUMENTS.items()
-    ]
     passed = ('camera', 'color_topic', 'depth_topic', 'info_topic', 'init_box', 'variant')
     tracker = IncludeLaunchDescription(
-        PythonLaunchDescriptionSource(str(SHARE / 'launch' / 'tracker.launch.py')),
+        PythonLaunchDescriptionSource(str(CONFIG.parent / 'launch' / 'tracker.launch.py')),
         launch_arguments=[
             *((name, LaunchConfiguration(name)) for name in passed),
             ('params_file', LaunchConfiguration('params_file')),
@@ -64,4 +57,4 @@ def generate_launch_description() -> LaunchDescription:
         output='screen',
         on_exit=Shutdown(reason='the recording has ended'),
     )
-    return LaunchDescription([*declared, tracker, replay])
+    return LaunchDescription([*declared(ARGUMENTS), tracker, replay])

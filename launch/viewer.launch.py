@@ -8,24 +8,14 @@
 The camera is that of the tracker; any other host than 127.0.0.1 needs RGBD_KCF_TOKEN to be set.
 """
 
-from pathlib import Path
-
-from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
-from launch.substitutions import LaunchConfiguration
+from launch.actions import OpaqueFunction
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.live.camera_profiles import camera_profile, load_cameras
+from rgbd_kcf_tracker.ros.launching import CAMERA, chosen_camera, declared, given, is_true
 
-CONFIG = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config')
 ARGUMENTS = {
-    'camera': ('kinect2_qhd', 'Profile of config/cameras.yaml: where the driver publishes.'),
-    'cameras_file': (str(CONFIG / 'cameras.yaml'), 'The file of profiles.'),
-    'color_topic': ('', "Colour topic, instead of the profile's."),
-    'depth_topic': ('', "Depth topic, registered to colour, instead of the profile's."),
-    'info_topic': ('', "CameraInfo topic, instead of the profile's."),
-    'compressed': ('false', 'Subscribe to compressed images (several machines).'),
+    **CAMERA,
     'tracker': ('tracker', 'Name of the tracker node, with its namespace.'),
     'host': ('127.0.0.1', 'Address to listen on.'),
     'port': ('8080', 'TCP port of the page.'),
@@ -35,23 +25,15 @@ ARGUMENTS = {
 
 def start(context: LaunchContext) -> list:
     """The node, once the arguments are known."""
-    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    profile = camera_profile(Path(given['cameras_file']), given['camera'])
-    remappings = dict(profile.remappings())
-    for name, topic in (
-        ('color/image', given['color_topic']),
-        ('depth/image', given['depth_topic']),
-        ('color/camera_info', given['info_topic']),
-    ):
-        if topic:
-            remappings[name] = topic
+    values = given(ARGUMENTS, context)
+    profile, remappings = chosen_camera(values)
     parameters = {
-        'tracker': given['tracker'],
-        'host': given['host'],
-        'port': int(given['port']),
-        'rate': float(given['rate']),
+        'tracker': values['tracker'],
+        'host': values['host'],
+        'port': int(values['port']),
+        'rate': float(values['rate']),
     }
-    if given['compressed'].strip().lower() in ('true', '1', 'yes', 'on'):
+    if is_true(values['compressed']):
         parameters |= profile.transports(compressed=True)
     return [
         Node(
@@ -59,7 +41,7 @@ def start(context: LaunchContext) -> list:
             executable='viewer',
             name='viewer',
             parameters=[parameters],
-            remappings=list(remappings.items()),
+            remappings=remappings,
             output='screen',
         )
     ]
@@ -67,13 +49,4 @@ def start(context: LaunchContext) -> list:
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments and the node."""
-    names = ', '.join(load_cameras(CONFIG / 'cameras.yaml'))
-    declared = [
-        DeclareLaunchArgument(
-            name,
-            default_value=default,
-            description=f'{text} One of: {names}.' if name == 'camera' else text,
-        )
-        for name, (default, text) in ARGUMENTS.items()
-    ]
-    return LaunchDescription([*declared, OpaqueFunction(function=start)])
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=start)])

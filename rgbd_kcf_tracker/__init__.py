@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
+from rgbd_kcf_tracker.lazy import lazily
+
 TYPE_CHECKING = False  # that of typing costs an import
 if TYPE_CHECKING:
-    from typing import Any
-
     from rgbd_kcf_tracker.errors import RgbdKcfError
     from rgbd_kcf_tracker.frame import Frame
     from rgbd_kcf_tracker.geometry import Box, Intrinsics
@@ -31,30 +31,15 @@ __all__ = [
     'create_tracker',
 ]
 
-_HOMES = {
-    'Box': 'geometry',
-    'Frame': 'frame',
-    'Intrinsics': 'geometry',
-    'Pose': 'pose',
-    'RgbdKcfError': 'errors',
-    'TargetSet': 'targets',
-    'Track': 'track',
-    'TrackState': 'track',
-    'Tracker': 'track',
-    'create_tracker': 'variants',
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Import what is used when it is used: the command line starts without the trackers."""
-    from importlib import import_module
-
-    if name not in _HOMES:
-        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        'errors': 'RgbdKcfError',
+        'frame': 'Frame',
+        'geometry': 'Box Intrinsics',
+        'pose': 'Pose',
+        'targets': 'TargetSet',
+        'track': 'Track TrackState Tracker',
+        'variants': 'create_tracker',
+    },
+)

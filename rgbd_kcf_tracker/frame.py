@@ -69,3 +69,13 @@ class Frame:
     def height(self) -> int:
         """Rows of the colour image."""
         return int(self.color.shape[0])
+
+    def seconds_since(self, stamp_ns: int, least: float, most: float) -> float:
+        """Seconds since an earlier stamp, as a tracker may take them.
+
+        Args:
+            stamp_ns: nanoseconds.
+            least: for a clock that stood still or went back.
+            most: for a pause or a clock that jumped.
+        """
+        return min(max((self.stamp_ns - stamp_ns) * 1e-9, least), most)

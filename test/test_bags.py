@@ -46,6 +46,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
+from rgbd_kcf_tracker.live.replay_source import ReplaySource
 from rgbd_kcf_tracker.recordings import (
     BagWriter,
     CameraTopics,
@@ -179,7 +181,11 @@ def test_types_that_ros_2_lacks_or_changed_come_along_from_ros_1(tmp_path: Path)
     assert copy_bag(bag, tmp_path / 'a.mcap') == (3, [])
     bag.close()
     with AnyReader([tmp_path / 'a.mcap']) as reader:
-        found = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages()]
+        copied = [(c.topic, c.msgtype, raw) for c, _, raw in reader.messages()]
+        found = [reader.deserialize(raw, kind) for _, kind, raw in copied]
+    with ReplaySource(tmp_path / 'a.bag', ReplayParameters()) as source:
+        kinds = {topic.name: topic.type for topic in source.topics}
+        assert [(m.topic, kinds[m.topic], m.data) for m in source.messages()] == copied
     assert found[0].name == 'thing'
     assert list(found[0].values) == [1.5, 2.5]
     assert (found[0].header.frame_id, found[0].due.sec, found[0].due.nanosec) == ('here', 5, 6)

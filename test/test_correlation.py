@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,
     gaussian_correlation,
-    gaussian_labels,
     linear_correlation,
     peak,
 )

@@ -83,6 +83,20 @@ def test_demo_names_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert 'Traceback' not in done.stderr
 
 
+def test_demo_replaces_nothing_unasked(tmp_path: Path) -> None:
+    mine = tmp_path / 'log' / 'mine.txt'
+    mine.parent.mkdir()
+    mine.write_text('years of work')
+    done = subprocess.run(
+        [sys.executable, '-m', 'rgbd_kcf_tracker.bench.demo', str(tmp_path)],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert '--overwrite' in done.stderr
+    assert 'Traceback' not in done.stderr
+    assert [p for p in tmp_path.rglob('*') if p.is_file()] == [mine]
+
+
 def test_contact_sheet_shows_right_wrong_and_hidden() -> None:
     picture = np.full((180, 320, 3), 90, np.uint8)
     box = Box(100, 40, 50, 100)

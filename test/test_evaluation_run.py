@@ -130,7 +130,7 @@ def test_short_term_protocol_does_not_count_frames_without_the_target():
 def test_thumbnails_stay_few_and_evenly_spread():
     thumbnails = Thumbnails(most=5)
     for sample in moving_samples(60, 1):
-        thumbnails.feed(sample.frame)
+        thumbnails.feed(sample)
     indices = sorted(thumbnails.pictures)
     assert 5 <= len(indices) <= 10
     assert indices[0] == 0

@@ -12,10 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpl_toolkits.mplot3d import Axes3D
 
 from rgbd_kcf_tracker import Frame, Track, create_tracker
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.evaluation import plot_style
+from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.thesis.correlation import linear_correlation, spectrum
 from rgbd_kcf_tracker.thesis.depth_patch import DepthPatch
@@ -23,7 +26,7 @@ from rgbd_kcf_tracker.thesis.kcf import KcfModel
 from rgbd_kcf_tracker.view.explain.book import explain
 from rgbd_kcf_tracker.view.explain.circulant import block_circulant, circulant, permutation
 from rgbd_kcf_tracker.view.explain.page import Chapter, equation, write_page
-from rgbd_kcf_tracker.view.explain.picture import Picture
+from rgbd_kcf_tracker.view.explain.picture import Picture, show_mesh
 from rgbd_kcf_tracker.view.sources import SimulatedRecording, first_box
 
 ASKED = 8
@@ -86,6 +89,39 @@ def test_each_says_two_sentences_and_names_functions_that_exist() -> None:
                 for part in path.split('.'):
                     found = getattr(found, part)
                 assert callable(found)
+
+
+def test_every_sign_of_an_equation_is_explained() -> None:
+    """A reader needs nothing but the page: no letter of an equation is left without a meaning."""
+    for chapter in chapters().values():
+        for picture in chapter.pictures:
+            assert bool(picture.equation) == bool(picture.signs), picture.name
+            explained = set().union(*(letters(sign) for sign, _ in picture.signs))
+            assert letters(picture.equation) <= explained, picture.name
+            assert all(words for _, words in picture.signs)
+
+
+def letters(mathtext: str) -> set[str]:
+    """Latin and Greek letters and accents of an equation; words and functions mean themselves."""
+    known = r'mathrm\{[^}]*\}|(?:frac|sqrt|sum|exp|cos|min|max|left|right|ldots|quad|leq|cdot|vert'
+    rest = re.sub(rf'\\(?:{known}|Vert|pi|[,; ])(?![a-z]))', ' ', mathtext)
+    greek = set(re.findall(r'\\[A-Za-z]+', rest))
+    return greek | set(re.findall(r'[A-Za-z]', re.sub(r'\\[A-Za-z]+', ' ', rest)))
+
+
+def test_every_cue_of_the_verdict_is_explained() -> None:
+    assert evidence.CUE_WORDS.keys() == {name for name, _ in evidence.CUES}
+
+
+def test_a_surface_in_perspective_keeps_its_peak(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many cells the highest of some neighbours is drawn, never one that leaves out the top."""
+    values = np.zeros((201, 37))
+    values[131, 17] = 1
+    drawn = []
+    monkeypatch.setattr(Axes3D, 'plot_surface', lambda _, x, y, z, **options: drawn.append(z))
+    show_mesh(plot_style.figure(3, 3), (1, 1, 1), values, '', '')
+    assert drawn[0].shape[0] <= 101
+    assert drawn[0].max() == 1
 
 
 def test_features_and_response_are_those_of_the_tracker() -> None:

@@ -63,6 +63,8 @@ def launch_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     packages = SimpleNamespace(get_package_share_directory=lambda _: str(PROJECT))
     monkeypatch.setitem(sys.modules, 'ament_index_python', ModuleType('ament_index_python'))
     monkeypatch.setitem(sys.modules, 'ament_index_python.packages', packages)
+    # It may have been imported with others.
+    monkeypatch.delitem(sys.modules, 'rgbd_kcf_tracker.ros.launching', raising=False)
 
 
 def start_tracker(**given: str) -> tuple[Any, list[Any]]:

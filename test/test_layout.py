@@ -24,7 +24,7 @@ SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
 # A layer imports from its own and from those below it; what stands beside another in one layer does
 # not know of it, but for SIDEWAYS.
 LAYERS = (
-    ('errors',),
+    ('errors', 'lazy'),
     ('extras', 'parameters', 'geometry', 'pose'),
     ('frame',),
     ('track',),
@@ -56,7 +56,7 @@ ROS_MODULES = {
     'lifecycle_msgs', 'rosgraph_msgs', 'rcl_interfaces', 'builtin_interfaces',
 }  # fmt: skip
 LEAN = {
-    'errors', 'parameters', 'geometry', 'frame', 'track',
+    'errors', 'lazy', 'parameters', 'geometry', 'frame', 'track',
     'features', 'metric', 'thesis', 'variants', 'targets',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker import Frame, Intrinsics
+from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
-from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures, resampled
+from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker import Box
+from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
 from rgbd_kcf_tracker.thesis.color_histogram import (
     ColorHistogram,
     bhattacharyya_distance,
@@ -22,9 +23,7 @@ from rgbd_kcf_tracker.thesis.particle_filter import (
     ProcessNoise,
     X,
     Y,
-    effective_size,
     normal_likelihood,
-    systematic_resample,
 )
 
 STILL = ProcessNoise(0, 0, 0, 0)

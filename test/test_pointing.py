@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Choosing a target by a click and by itself, on simulated scenes and on real people."""
+"""Choosing a target by a click, on simulated scenes and on real people."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.errors import BoxError
-from rgbd_kcf_tracker.metric.perceive.people import PersonFinder
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.simulation import simulate
 
@@ -82,21 +81,6 @@ def test_clicks_on_simulated_targets(scenario: str) -> None:
     assert np.median(overlaps) > 0.6
 
 
-def test_the_nearest_upright_person_sized_thing_is_found() -> None:
-    near, far = Box(100, 120, 120, 300), Box(400, 150, 80, 220)
-    low, pole = Box(250, 380, 120, 60), Box(560, 20, 6, 400)
-    frame = blocks((near, 2.6), (far, 3.4), (low, 1.5), (pole, 2.0))
-    finder = PersonFinder(confirm=False)
-    assert [round(c.depth, 1) for c in finder.candidates(frame)] == [2.6, 3.4]
-    assert finder.nearest(frame).iou(near) > 0.9
-    assert PersonFinder(near=3.0, confirm=False).nearest(frame).iou(far) > 0.9
-    assert PersonFinder(far=2.0, confirm=False).nearest(frame) is None
-    # A block of noise is no person for the detector.
-    confirming = PersonFinder(confirm=True)
-    assert not confirming.confirms or confirming.nearest(frame) is None
-    assert finder.nearest(Frame(frame.color)) is None
-
-
 def real_frames(folder: Path, step: int) -> list[tuple[int, Frame]]:
     camera = Intrinsics(534.29, 534.75, 309.57, 243.07)
     found = []
@@ -108,24 +92,16 @@ def real_frames(folder: Path, step: int) -> list[tuple[int, Frame]]:
     return found
 
 
-def test_real_people_are_found_and_nothing_else(shared_data: Path) -> None:
+def test_clicks_on_real_people(shared_data: Path) -> None:
     folder = shared_data / 'rgbd' / 'filinha'
     frames = real_frames(folder, 4)
     truths = [np.loadtxt(path, delimiter=',', ndmin=2) for path in folder.glob('groundtruth_*.txt')]
     first = int(min((folder / 'rgb').iterdir()).stem)
-    finder = PersonFinder()
-    if not finder.confirms:
-        pytest.skip('this OpenCV has no people detector')
-    found = clicked = people = 0
+    clicked = people = 0
     for number, frame in frames:
         rows = [truth[number - first] for truth in truths]
         boxes = [Box(*row) for row in rows if np.isfinite(row).all() and row[2] > 0]
-        box = finder.nearest(frame)
-        if box is not None:
-            found += 1
-            assert max(box.iou(other) for other in boxes) > 0.5, f'frame {number}'
         for other in boxes:
             people += 1
             clicked += surface_at(frame, other.cx, other.y + 0.35 * other.height).iou(other) > 0.5
-    assert found >= 10
     assert clicked > 0.85 * people

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -21,10 +22,12 @@ def test_benchmark_measures_a_live_camera(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / 'live.json'
-    live.main(['--sizes', 'qhd', '--seconds', '3', '--output', str(output)])
+    # At 15 Hz the topics' history of five holds out a third of a second without the processor.
+    rate = ('--rate', '15', '--seconds', '6')
+    live.main(['--sizes', 'qhd', *rate, '--output', str(output)])
     (result,) = json.loads(output.read_text())
     assert result['sent'] == 120
-    assert result['received'] >= 60  # best effort, on a machine however busy
+    assert result['received'] >= 115
     tracker, wire = result['tracker'], result['wire']
     assert tracker['answered'] + result['dropped'] == result['received']
     assert tracker['boxes'] >= 0.9 * tracker['answered'] > 0
@@ -37,7 +40,7 @@ def test_benchmark_measures_a_live_camera(
         assert 0 < figures['cpu_ms'] < 500
     assert result['stages']['work_median_ms'] > 0
     printed = capsys.readouterr().out
-    assert '| qhd 960x540 | 30 | 120 |' in printed
+    assert '| qhd 960x540 | 15 | 120 |' in printed
     assert 'on top of the wire' in printed
 
 
@@ -48,3 +51,18 @@ def test_soak_shortened(tmp_path: Path) -> None:
     assert result['answered'] == result['sent'] == 1000
     assert result['boxes'] > 900
     assert result['end_mb'] - result['settled_mb'] < soak.GROWTH_MB
+
+
+@pytest.mark.parametrize('command', [live.main, soak.main])
+def test_figures_of_an_earlier_run_are_kept(
+    command: Callable[[list[str]], int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    earlier = tmp_path / 'earlier.json'
+    earlier.write_text('[]')
+    with pytest.raises(SystemExit, match='2'):
+        command(['--output', str(earlier)])
+    assert '--overwrite' in capsys.readouterr().err
+    assert earlier.read_text() == '[]'
+    with pytest.raises(SystemExit, match='2'):
+        command(['--output', str(tmp_path / 'nowhere' / 'a.json')])
+    assert 'nowhere' in capsys.readouterr().err

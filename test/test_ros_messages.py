@@ -10,6 +10,7 @@ import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -159,7 +160,7 @@ def test_detections(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize('state', list(TrackState))
-def test_annotated_is_a_copy_with_something_on_it(state: TrackState) -> None:
+def test_an_annotated_picture_is_a_copy_with_something_on_it(state: TrackState) -> None:
     image = np.full((120, 160, 3), 90, np.uint8)
     box = Box(-20, 10, 60, 200) if state is TrackState.TRACKING else None
     out = draw_track(image, Track(box, state, 0.5, 1.5))
@@ -168,13 +169,29 @@ def test_annotated_is_a_copy_with_something_on_it(state: TrackState) -> None:
     assert out.shape == image.shape
 
 
-def processor(faults: list[str]) -> Processor:
+def processor(faults: list[str], **options: Any) -> Processor:
     session = Session(DEFAULT_VARIANT, default_parameters(DEFAULT_VARIANT), faults.append)
     session.choose(lambda _: None)
     silent = SimpleNamespace(
         image_wanted=False, publish=lambda _: None, publish_extras=lambda _: None
     )
-    return Processor(session, silent, Statistics(), lambda: 0, lambda _, text: faults.append(text))
+    return Processor(
+        session, silent, Statistics(), lambda: 0, lambda _, text: faults.append(text), **options
+    )
+
+
+@pytest.mark.parametrize('transport', ['raw', 'compressed'])
+def test_an_image_beyond_max_pixels_is_refused(transport: str) -> None:
+    picture = np.full((48, 64, 3), 90, np.uint8)
+    color: Any = image_message(HEADER, picture, 'bgr8')
+    if transport == 'compressed':
+        color = CompressedImage(header=HEADER, data=cv2.imencode('.png', picture)[1].tobytes())
+    for limit in (64 * 48, 64 * 48 - 1):
+        faults: list[str] = []
+        made = processor(faults, color_transport=transport, max_pixels=limit)
+        frame = made.frame(Capture(color, None, None, 0), 0)
+        assert (frame is None) == (limit < 64 * 48) == bool(faults)
+    assert 'max_pixels sets the limit' in faults[0]
 
 
 encodings = st.sampled_from(

@@ -151,6 +151,8 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
             'rgbd_kcf_tracker.ros.tracker_main',
             *('--ros-args', '-r', f'__ns:={NAMESPACE}', *transports),
             *('-p', f'init_box:={first_box("qhd")}'),
+            # UDP may lose an image; nothing else is to be missing, however busy the machine is.
+            *('-p', 'queue_policy:=all', '-p', 'reliability:=best_effort'),
             **variables,
         )
         # The consumer must know the tracker before there is anything to miss.
@@ -173,9 +175,7 @@ def test_three_machines(network: Network, multicast: bool, compressed: bool) -> 
             process.wait(10)
             process.stdout.close()
     print(f'\nqhd, compressed {compressed}: {sent / count / 1e3:.0f} kB a pair, {figures}')
-    # UDP may lose a message on a busy machine, and the tracker may pass over a pair there.
-    passed_over = int(figures['diagnostics'].get('dropped', 0))
-    assert figures['answers'] + passed_over >= 0.8 * count
+    assert figures['answers'] >= 0.8 * count
     assert figures['boxes'] >= 0.9 * figures['answers']
     raw = 960 * 540 * 5
     assert sent / count < (0.5 if compressed else 1.3) * raw

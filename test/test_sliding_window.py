@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from rgbd_kcf_tracker.features.hog import fhog
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,
-    gaussian_labels,
 )
 from rgbd_kcf_tracker.thesis.sliding_window import (
     search_span,

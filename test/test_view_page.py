@@ -41,6 +41,11 @@ def recording() -> SimulatedRecording:
     return SimulatedRecording('occlusion', 3, 15.0, SIZE, 3.0)
 
 
+@lru_cache(maxsize=1)
+def crowd() -> SimulatedRecording:
+    return SimulatedRecording('crowd', 3, 15.0, SIZE, 3.0)
+
+
 @pytest.fixture(scope='module')
 def chromium() -> Iterator[Browser]:
     with browsers.browser() as opened:
@@ -50,10 +55,13 @@ def chromium() -> Iterator[Browser]:
 class Served:
     """A player and its server, which can be ended and started again."""
 
-    def __init__(self, box: bool = True, token: str = '') -> None:
-        start, first = first_box(recording(), None)
+    def __init__(
+        self, box: bool = True, token: str = '', scene: SimulatedRecording | None = None
+    ) -> None:
+        scene = recording() if scene is None else scene
+        start, first = first_box(scene, None)
         self.truth = first
-        self.player = Player(recording(), 'metric', start=start, box=first if box else None)
+        self.player = Player(scene, 'metric', start=start, box=first if box else None)
         self.token = token
         self.server = Server(self.player, port=0, token=token)
         self.server.start()
@@ -238,6 +246,54 @@ def test_parameters_have_their_ranges_and_are_sent(chromium: Browser, served: Se
     page.until("page.shown.variant === 'kcf' && document.getElementById('parameter-padding')")
     assert page.value("fetch('parameters.yaml').then(r => r.text())").startswith('/**:')
     assert page.value("fetch('boxes.csv').then(r => r.text())").startswith('id,frame,stamp_ns')
+
+
+@pytest.fixture
+def crowded() -> Iterator[Served]:
+    made = Served(scene=crowd())
+    yield made
+    made.close()
+
+
+def test_everyone_is_shown_followed_renamed_and_let_go(chromium: Browser, crowded: Served) -> None:
+    page = opened(chromium, crowded)
+    page.value("send({do: 'seek', frame: 30})")
+    page.until('page.shown.frame === 30')
+    assert page.value("document.getElementById('others').children.length") == 0
+    page.press('#everyone')
+    page.until('page.shown.everyone && page.shown.targets.length > 1')
+    page.until("document.querySelectorAll('#others li').length === page.shown.targets.length - 1")
+    # Each has a caption in the colour of its own above its box, and its place in the room.
+    other = page.value('page.shown.targets.find(t => !t.chosen && t.box && t.box[1] > 20)')
+    x, y = other['box'][:2]
+    color = page.value(f'rgb(colorOf({other["id"]})).map(v => 255 * v)')
+    assert any(near(pixel(page, x + 1, y - up), color, 30) for up in range(2, 8))
+    assert other['position'] is not None
+    assert page.value("document.querySelectorAll('#others .views img').length") > 0
+
+    page.value(
+        "[...document.querySelectorAll('#others li')].find(li => "
+        f"li.dataset.id === '{other['id']}').querySelector('button').click()"
+    )
+    page.until("document.querySelectorAll('#targets li').length === 2")
+    page.value(
+        f'(() => {{ const i = document.querySelector(\'#targets li[data-id="{other["id"]}"] '
+        "input'); i.value = 'Anna'; i.dispatchEvent(new Event('change')); })()"
+    )
+    page.until("page.shown.targets.some(t => t.name === 'Anna' && t.chosen)")
+    page.value("send({do: 'seek', frame: 36})")
+    page.until('page.shown.frame === 36 && page.trails.get(1).length > 20')
+    # The last of a trail is where the target is.
+    seen = 'page.shown.targets.find(t => t.position)'
+    place, trail = page.value(f'[{seen}.position, page.trails.get({seen}.id).pop()]')
+    assert trail == pytest.approx(place, abs=0.01)
+    names = page.value("[...document.getElementById('why-of').options].map(o => o.textContent)")
+    assert names == ['target 1', 'Anna']
+    page.press('#targets li:last-child button')
+    page.until("document.querySelectorAll('#targets li').length === 1")
+    page.press('#everyone')
+    page.until('!page.shown.everyone && page.shown.targets.length === 1')
+    assert page.errors == []
 
 
 def test_names_are_shown_as_they_are(chromium: Browser, served: Served) -> None:

@@ -23,6 +23,7 @@ pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[vi
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState, create_tracker
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.export import export
@@ -31,9 +32,9 @@ from rgbd_kcf_tracker.view.player import Player
 from rgbd_kcf_tracker.view.showing import (
     Detail,
     Seen,
-    confusion,
     depth_picture,
     ellipse,
+    rival,
     room_points,
     show,
 )  # fmt: skip
@@ -134,6 +135,103 @@ def test_another_target_is_added_where_it_is_picked() -> None:
     assert [t['id'] for t in later['targets']] == [1, 2]
     rig.ask('rename', id=2, name='chair')
     assert rig.ask('remove', id=1)['targets'][0]['name'] == 'chair'
+
+
+@lru_cache(maxsize=1)
+def crowd() -> SimulatedRecording:
+    return SimulatedRecording('crowd', 3, 15.0, SIZE, 3.0)
+
+
+class Crowd(Rig):
+    """A player of a crowd, in which somebody is followed and everyone else may be."""
+
+    def __init__(self, everyone: bool) -> None:
+        start, first = first_box(crowd(), None)
+        self.player = Player(crowd(), 'metric', start=start, box=first, everyone=everyone)
+        self.player.board.watch(lambda: None)
+        self.player._guarded(self.player._open)
+
+
+def boxes_of(seen: dict[str, Any]) -> dict[int, Any]:
+    return {t['id']: t['box'] for t in seen['targets']}
+
+
+def test_everyone_in_view_is_what_the_set_says_of_the_frame() -> None:
+    rig = Crowd(everyone=True)
+    start, first = first_box(crowd(), None)
+    targets = TargetSet('metric')
+    targets.everyone = True
+    frames = crowd().frames(start, 36)
+    frame = next(frames)
+    targets.update(frame)
+    chosen = targets.add(frame, first)
+    tracks = [targets.update(frame) for frame in frames][-1]
+    seen = rig.ask('seek', frame=35)
+    assert len(tracks) > 2
+    expected = [[round(v, 2) for v in t.box.as_tuple()] if t.box else None for t in tracks.values()]
+    assert list(boxes_of(seen).values()) == expected
+    assert [t['chosen'] for t in seen['targets']] == [number == chosen for number in tracks]
+    assert [t['name'] for t in seen['targets']][:2] == ['target 1', 'person 2']
+    rows = list(csv.DictReader(io.StringIO(rig.player.boxes_csv())))
+    assert {row['id'] for row in rows} >= {str(t['id']) for t in seen['targets']}
+
+
+def test_one_of_everyone_is_followed_renamed_and_let_go() -> None:
+    rig = Crowd(everyone=True)
+    seen = rig.ask('seek', frame=35)
+    other = next(t for t in seen['targets'] if not t['chosen'] and t['box'])
+    seen = rig.ask('follow', id=other['id'], frame=35)
+    assert {t['id'] for t in seen['targets'] if t['chosen']} == {1, other['id']}
+    rig.ask('rename', id=other['id'], name='Anna')
+    assert len(rig.ask('seek', frame=38)['targets'][1]['considered']) > 0
+    seen = rig.ask('remove', id=other['id'])
+    assert {t['id'] for t in seen['targets'] if t['chosen']} == {1}
+    # Without being chosen she goes on under her name.
+    seen = rig.ask('seek', frame=40)
+    assert 'Anna' in [t['name'] for t in seen['targets'] if not t['chosen']]
+    hidden = next((t['id'] for t in seen['targets'] if not t['box']), 99)
+    assert 'not in sight' in rig.ask('follow', id=hidden, frame=40)['word']
+
+
+def test_everyone_may_be_asked_for_later_and_keeps_the_ids_when_the_run_goes_on() -> None:
+    rig = Crowd(everyone=False)
+    assert len(rig.ask('seek', frame=35)['targets']) == 1
+    seen = rig.ask('everyone', value=True)
+    assert seen['everyone']
+    before = boxes_of(seen)
+    assert len(before) > 1
+    after = boxes_of(rig.ask('parameter', name='acceptance', value=0.6))
+    assert after.keys() == before.keys()
+    # Only metric can: another variant goes on with those who were chosen.
+    seen = rig.ask('variant', name='kcf')
+    assert not seen['everyone']
+    assert [t['id'] for t in seen['targets']] == [1]
+    assert 'use metric' in rig.ask('everyone', value=True)['word']
+
+
+def test_views_are_the_trackers_own_with_the_pictures_that_they_are_of() -> None:
+    rig = Rig()
+    rig.ask('seek', frame=14)
+    views = rig.player._insights[1].gallery
+    known = rig.player._known[1]
+    assert [k.view for k in known] == list(views)
+    assert all(k.picture.startswith(b'\xff\xd8') and len(k.colors) == 9 for k in known)
+    assert rig.seen['targets'][0]['colors'] == [k.colors for k in known]
+    rig.ask('variant', name='kcf')
+    rig.ask('seek', frame=20)
+    assert len(rig.player._known[1]) == 1
+
+
+@pytest.mark.parametrize('variant', ['kcf', 'rgbd', 'rgbd_pf'])
+def test_the_last_minute_has_the_response_also_while_hidden(variant: str) -> None:
+    rig = Rig(variant=variant)
+    entries = rig.ask('seek', frame=29)['entries']
+    responses = [e['targets'][0][5] for e in entries[1:]]
+    assert all(0 < r < 1.2 for r in responses)
+    expected = tracked(variant)
+    for entry, track in zip(entries[1:], expected[1:], strict=True):
+        if track.box is not None and variant == 'kcf':
+            assert entry['targets'][0][5] == pytest.approx(track.score, abs=1e-3)
 
 
 def test_a_click_takes_the_surface_there() -> None:
@@ -247,9 +345,9 @@ def test_confusion_is_of_what_was_not_taken() -> None:
 
     here, there = Box(0, 0, 10, 10), Box(50, 0, 10, 10)
     insight = Insight((Considered(here, 0.9, {}), Considered(there, 0.4, {})))
-    assert confusion(Track(here, TrackState.TRACKING), insight) == 0.4
-    assert confusion(Track(None, TrackState.OCCLUDED), insight) == 0.9
-    assert confusion(Track(here, TrackState.TRACKING), None) == 0
+    assert rival(Track(here, TrackState.TRACKING), insight) is insight.considered[1]
+    assert rival(Track(None, TrackState.OCCLUDED), insight) is insight.considered[0]
+    assert rival(Track(here, TrackState.TRACKING), None) is None
 
 
 def test_a_frame_without_depth_is_shown_without() -> None:

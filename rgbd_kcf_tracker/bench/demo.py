@@ -22,8 +22,10 @@ from typing import Any
 from tqdm import tqdm
 
 from rgbd_kcf_tracker.bench.demo_nodes import DemoError, keep_to_this_machine, last_line, node
+from rgbd_kcf_tracker.cli.common import add_overwrite_option
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.outputs import check_outputs
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
@@ -74,15 +76,17 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--seconds', type=float, default=10.0, help='length of the recording')
     parser.add_argument('--rate', type=float, default=30.0, help='frames per second')
     parser.add_argument('--size', default='960x540', metavar='WxH', help='of the images')
+    add_overwrite_option(parser, 'the results of an earlier run')
     return parser.parse_args(arguments)
 
 
 def _demo(options: argparse.Namespace) -> None:
     dest: Path = options.dest
     logs = dest / 'log'
+    check_outputs({'DEST': dest}, overwrite=options.overwrite, folders=('DEST',))
     try:
         logs.mkdir(parents=True, exist_ok=True)
-        for old in logs.iterdir():
+        for old in logs.glob('*.log'):
             old.unlink()
     except OSError as error:
         raise DemoError(f'{dest} cannot be written: {error.strerror or error}') from None

@@ -13,19 +13,19 @@ the tracker has on top of that means something on any machine, however busy.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import socket
 import sys
 import time
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
 from rgbd_kcf_tracker.bench.camera import BLOCK, NAMESPACE, SCENARIO, SEED, SIZES, START
+from rgbd_kcf_tracker.bench.figures import add_output_options, check_output, write_output
 from rgbd_kcf_tracker.bench.rig import Listener, child, cpu_seconds, environment
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 WARM_UP = 30
@@ -248,8 +248,12 @@ def main(args: list[str] | None = None) -> int:
         help='that look at a viewer meanwhile (default: no viewer)',
     )
     parser.add_argument('--no-profile', action='store_true', help="use DDS's default transports")
-    parser.add_argument('--output', type=Path, help='JSON file for the figures')
+    add_output_options(parser)
     options = parser.parse_args(args)
+    try:
+        check_output(options)
+    except RgbdKcfError as error:
+        parser.error(str(error))
     results = []
     for variant in options.variants:
         for size in options.sizes:
@@ -271,10 +275,7 @@ def main(args: list[str] | None = None) -> int:
     print(table(results))
     for result in results:
         print('\n' + histogram(result))
-    if options.output is not None:
-        options.output.write_text(
-            json.dumps([asdict(r) for r in results], indent=1), encoding='utf-8'
-        )
+    write_output(options, [asdict(r) for r in results])
     return 0 if all(r.tracker.answered == r.sent for r in results) else 1
 
 

@@ -11,18 +11,18 @@ The camera sends a pair as soon as an earlier one is answered; both are processe
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 
 from rgbd_kcf_tracker.bench.camera import NAMESPACE, SIZES
+from rgbd_kcf_tracker.bench.figures import add_output_options, check_output, write_output
 from rgbd_kcf_tracker.bench.live import first_box
 from rgbd_kcf_tracker.bench.rig import Listener, child, environment, resident_mb
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 SAMPLES = 100
@@ -127,8 +127,12 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--frames', type=int, default=100_000)
     parser.add_argument('--size', choices=SIZES, default='small')
     parser.add_argument('--variant', choices=VARIANTS, default=DEFAULT_VARIANT)
-    parser.add_argument('--output', type=Path, help='JSON file for the figures')
+    add_output_options(parser)
     options = parser.parse_args(args)
+    try:
+        check_output(options)
+    except RgbdKcfError as error:
+        parser.error(str(error))
     soak = run(options.frames, options.size, options.variant)
     print(
         f'{soak.answered} of {soak.sent} pairs answered, {soak.boxes} with a box, in '
@@ -138,8 +142,7 @@ def main(args: list[str] | None = None) -> int:
         f'{soak.peak_mb:.1f} MB at most\n'
         f'{"sound" if soak.sound else "NOT SOUND"}'
     )
-    if options.output is not None:
-        options.output.write_text(json.dumps(asdict(soak), indent=1), encoding='utf-8')
+    write_output(options, asdict(soak))
     return 0 if soak.sound else 1
 
 

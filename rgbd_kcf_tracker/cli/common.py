@@ -70,6 +70,22 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_tracker_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that choose the tracker and where it begins."""
+    parser.add_argument(
+        '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
+    )
+    parser.add_argument(
+        '--param',
+        metavar='KEY=VALUE',
+        nargs='+',
+        action='extend',
+        default=[],
+        help='parameters of the tracker; an unknown name lists those there are',
+    )
+    parser.add_argument('--start', metavar='N', type=int, default=0, help='first frame (default 0)')
+
+
 def add_scene_options(parser: argparse.ArgumentParser, seed: int = 0) -> None:
     """Declare the options that choose a simulated scene where no recording is named."""
     group = parser.add_argument_group('simulated scene, where no SOURCE is named')

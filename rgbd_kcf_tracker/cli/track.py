@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.cli.common import (
     Warnings,
     add_overwrite_option,
     add_reading_options,
+    add_tracker_options,
     parse_assignments,
     parse_box,
     progress,
@@ -62,18 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='follow every person that appears, without being told',
     )
-    parser.add_argument(
-        '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
-    )
-    parser.add_argument(
-        '--param',
-        metavar='KEY=VALUE',
-        nargs='+',
-        action='extend',
-        default=[],
-        help='parameters of the tracker; an unknown name lists those there are',
-    )
-    parser.add_argument('--start', metavar='N', type=int, default=0, help='first frame (default 0)')
+    add_tracker_options(parser)
     parser.add_argument('--end', metavar='N', type=int, help='frame to stop before (default: all)')
     output = parser.add_argument_group('output')
     output.add_argument(

@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_overwrite_option,
     add_reading_options,
     add_scene_options,
+    add_tracker_options,
     counter,
     open_source,
     parse_assignments,
@@ -47,18 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the target's box in the first frame shown (default: the first ground-truth box, "
         'else it is picked in the page)',
     )
+    add_tracker_options(parser)
     parser.add_argument(
-        '--variant', metavar='NAME', help='tracker: kcf, rgbd, rgbd_pf or metric (the default)'
+        '--all', action='store_true', help='follow everyone in view too; only metric can'
     )
-    parser.add_argument(
-        '--param',
-        metavar='KEY=VALUE',
-        nargs='+',
-        action='extend',
-        default=[],
-        help='parameters of the tracker; an unknown name lists those there are',
-    )
-    parser.add_argument('--start', metavar='N', type=int, default=0, help='first frame (default 0)')
     page = parser.add_argument_group('page')
     page.add_argument('--port', metavar='P', type=int, default=8080, help='TCP port (default 8080)')
     page.add_argument(
@@ -101,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
             return _export(args, recording, variant, parameters, start, box)
         from rgbd_kcf_tracker.view.player import Player
 
-        player = Player(recording, variant, parameters, start=start, box=box)
+        player = Player(recording, variant, parameters, start=start, box=box, everyone=args.all)
         serve(player, args.host, args.port, _token(args), args.open)
     return 0
 
@@ -151,7 +144,7 @@ def _start(args: argparse.Namespace, recording: Recording) -> tuple[int, Box | N
     try:
         return first_box(recording, given, args.start)
     except BoxError:
-        if args.export is not None:
+        if args.export is not None and not args.all:
             raise
         return args.start, None
 
@@ -171,12 +164,11 @@ def _export(
     end = len(recording) if args.end is None else min(args.end, len(recording))
     if end <= start:
         raise ParameterError(f'--end {args.end}: it must be above {start}, where the target is')
-    assert box is not None
     assert isinstance(parameters, Parameters)
     with counter(end - start, 'frame') as done:
         count = export(
             recording, path, variant, parameters, start, end, box,
-            lambda number: done(1, ''), args.overwrite,
+            lambda number: done(1, ''), args.overwrite, args.all,
         )  # fmt: skip
     size = path.stat().st_size / 1e6
     print(

@@ -12,10 +12,9 @@ In Python::
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Items
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -23,12 +22,12 @@ import numpy as np
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
-from rgbd_kcf_tracker.evaluation import boxfiles
+from rgbd_kcf_tracker.evaluation import boxfiles, passes
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
-from rgbd_kcf_tracker.evaluation.passes import trace
+from rgbd_kcf_tracker.evaluation.passes import Pass
 from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.frame import Frame
@@ -85,39 +84,13 @@ class EveryoneResult:
     scores: Everyone
 
 
-@dataclass(eq=False)
-class EveryonePass:
-    """A tracker of several targets, given frame after frame, nobody's box among them.
+class EveryonePass(Pass[Targets, Mapping[int, Track]]):
+    """A tracker of several targets, given frame after frame, nobody's box among them."""
 
-    Attributes:
-        targets: what is run; None where the tracks come from a file.
-        tracks: by frame.
-        milliseconds: of each update.
-        error: why it stopped, empty while it runs.
-    """
-
-    targets: Targets | None
-    tracks: list[Mapping[int, Track]] = field(default_factory=list)
-    milliseconds: list[float] = field(default_factory=list)
-    error: str = ''
-
-    def __post_init__(self) -> None:
-        if self.targets is not None:
-            self.targets.everyone = True
-
-    def feed(self, frame: Frame) -> None:
-        """Give the tracker one more frame; an exception stops this tracker, not the run."""
-        if self.error or self.targets is None:
-            return
-        try:
-            before = time.perf_counter()
-            tracks = self.targets.update(frame)
-            self.milliseconds.append((time.perf_counter() - before) * 1000)
-            self.tracks.append(dict(tracks))
-        except RgbdKcfError as error:
-            self.error = f'frame {len(self.tracks)}: {error}'
-        except Exception:
-            self.error = f'frame {len(self.tracks)}: {trace()}'
+    def _step(self, tracker: Targets, sample: Sample) -> Mapping[int, Track]:
+        if not self.tracks:
+            tracker.everyone = True
+        return dict(tracker.update(sample.frame))
 
 
 def follow(targets: Targets, samples: Iterable[Sample]) -> Followed:
@@ -126,14 +99,12 @@ def follow(targets: Targets, samples: Iterable[Sample]) -> Followed:
     Raises:
         RgbdKcfError: as the tracker or the source does.
     """
-    truth, tracks, spent = _Truth(), [], []
-    targets.everyone = True
-    for sample in samples:
-        truth.feed(sample)
-        before = time.perf_counter()
-        tracks.append(dict(targets.update(sample.frame)))
-        spent.append((time.perf_counter() - before) * 1000)
-    return Followed(truth.sightings(), truth.bodies(), sightings_of(tracks), tuple(spent))
+    truth, one = _Truth(), EveryonePass(targets)
+    passes.run(samples, truth, one)
+    one.check()
+    return Followed(
+        truth.sightings(), truth.bodies(), sightings_of(one.tracks), tuple(one.milliseconds)
+    )
 
 
 def sightings_of(tracks: Iterable[Mapping[int, Track]]) -> Sightings:
@@ -239,12 +210,9 @@ def run(
     Returns:
         Trackers that failed, and why.
     """
-    passes = {c.name: EveryonePass(None if c.kind == 'boxes' else c.make_set()) for c in contenders}
+    runs = {c.name: EveryonePass(None if c.kind == 'boxes' else c.make_set()) for c in contenders}
     truth = _Truth()
-    for sample in samples:
-        truth.feed(sample)
-        for one in passes.values():
-            one.feed(sample.frame)
+    passes.run(samples, truth, *runs.values())
     if not truth.numbers:
         raise RgbdKcfError(f'{sequence.name} has no frames')
     places = Places(folder, sequence.name)
@@ -256,7 +224,7 @@ def run(
         write_atomically(places.bodies, mot_text(whole))
     failed = []
     for contender in contenders:
-        one = passes[contender.name]
+        one = runs[contender.name]
         tracks = sightings_of(one.tracks)
         if contender.kind == 'boxes':
             try:

@@ -25,7 +25,8 @@ from scipy.optimize import minimize
 
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
-from rgbd_kcf_tracker.evaluation.datasets.base import at_rate, with_intrinsics
+from rgbd_kcf_tracker.evaluation.datasets.base import Sample, at_rate, with_intrinsics
+from rgbd_kcf_tracker.evaluation.passes import OnePass, run
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
@@ -70,49 +71,58 @@ class Examples:
         )
 
 
+class _Meetings:
+    """Labels the candidates that a tracker has weighed, as long as it is not astray."""
+
+    def __init__(self, tracker: MetricTracker, one: OnePass) -> None:
+        self.evidence: list[Evidence] = []
+        self.labels: list[int] = []
+        self._tracker, self._one = tracker, one
+        self._astray = self._back = 0
+
+    def feed(self, sample: Sample) -> None:
+        if len(self._one.tracks) < 2 or self._one.error:  # started, and nothing weighed yet
+            return
+        box = self._one.tracks[-1].box
+        truths = [] if sample.visible is None else [sample.visible]
+        if truths and sample.body is not None:
+            truths.append(sample.body)
+        if self._astray < ASTRAY:
+            for candidate, place in self._tracker.weighed():
+                overlap = max((place.iou(t) for t in truths), default=0.0)
+                if not WRONG <= overlap <= RIGHT:
+                    self.evidence.append(candidate.evidence)
+                    self.labels.append(int(overlap > RIGHT))
+        if box is None:
+            return
+        overlap = max((box.iou(t) for t in truths), default=0.0)
+        if overlap < WRONG:
+            self._astray, self._back = self._astray + 1, 0
+        elif overlap > RIGHT:
+            self._back += 1
+            if self._astray < ASTRAY or self._back >= BACK:
+                self._astray = 0
+
+
 def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> Examples:
     """Run the tracker over a sequence and label every candidate that it weighs."""
-    evidence: list[Evidence] = []
-    labels: list[int] = []
-    tracker: MetricTracker | None = None
-    astray = back = 0
     samples = sequence.open().samples
     if rate is not None:
         samples = at_rate(samples, rate)
     if camera is not None:
         samples = with_intrinsics(samples, camera)
-    for sample in samples:
-        if tracker is None:
-            if sample.visible is not None:
-                tracker = MetricTracker(MetricParameters())
-                tracker.start(sample.frame, sample.visible)
-            continue
-        track = tracker.update(sample.frame)
-        truths = [box for box in (sample.visible, sample.body) if box is not None]
-        if sample.visible is None:
-            truths = []
-        if astray < ASTRAY:
-            for candidate, box in tracker.weighed():
-                overlap = max((box.iou(t) for t in truths), default=0.0)
-                if not WRONG <= overlap <= RIGHT:
-                    evidence.append(candidate.evidence)
-                    labels.append(int(overlap > RIGHT))
-        if track.box is None:
-            continue
-        overlap = max((track.box.iou(t) for t in truths), default=0.0)
-        if overlap < WRONG:
-            astray, back = astray + 1, 0
-        elif overlap > RIGHT:
-            back += 1
-            if astray < ASTRAY or back >= BACK:
-                astray = 0
+    tracker = MetricTracker(MetricParameters())
+    one = OnePass(tracker)
+    met = _Meetings(tracker, one)
+    run(itertools.dropwhile(lambda sample: sample.visible is None, samples), one, met)
+    one.check()
     weight = REAL_WEIGHT if sequence.kind != 'sim' else 1.0
     if weight == 1.0 and rate is not None and rate < SPARSE_HZ:
         weight = SPARSE_WEIGHT
-    count = len(labels)
+    count = len(met.labels)
     return Examples(
-        np.array(evidence, np.object_),
-        np.array(labels, np.int64),
+        np.array(met.evidence, np.object_),
+        np.array(met.labels, np.int64),
         np.full(count, weight),
         np.full(count, sequence.scenario),
     )

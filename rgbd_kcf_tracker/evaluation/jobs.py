@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     with_intrinsics,
     without_depth,
 )
-from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts, trace
+from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, Truth, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
     write_json,
@@ -184,28 +184,21 @@ def _run_sequence(job: Job) -> list[Failure]:
             passes[contender.name] = OnePass(contender.make())
             if options.short_term and opened.annotated:
                 restarts[contender.name] = WithRestarts(contender.make())
-    thumbnails, samples, size = Thumbnails(), [], (0, 0)
-    for sample in _samples(opened, sequence, options):
-        size = sample.frame.width, sample.frame.height
-        samples.append(
-            (sample.frame.stamp_ns, sample.visible, sample.body, sample.fraction, sample.judged)
-        )
-        thumbnails.feed(sample.frame)
-        for one in (*passes.values(), *restarts.values()):
-            one.feed(sample)
-    if not samples:
+    thumbnails, truth = Thumbnails(), Truth()
+    samples = as_asked(from_first_view(opened.samples), sequence, options)
+    run(samples, truth, thumbnails, *passes.values(), *restarts.values())
+    stamps = truth.stamps_ns
+    if not stamps:
         raise RgbdKcfError(f'{sequence.name}: the target is never clearly in view')
-    stamps = [s[0] for s in samples]
-    body = [s[2] for s in samples] if opened.has_body else None
     write_truth(
-        truth_path(job.folder, sequence.name),
-        stamps, [s[1] for s in samples], body, [s[3] for s in samples], [s[4] for s in samples],
+        truth_path(job.folder, sequence.name), stamps, truth.visible,
+        truth.bodies if opened.has_body else None, truth.fractions, truth.judged,
     )  # fmt: skip
     write_atomically(thumbnails_path(job.folder, sequence.name), thumbnails.archive())
 
     failures = []
     for contender in job.contenders:
-        one = passes.get(contender.name) or _from_file(contender, sequence, opened, len(samples))
+        one = passes.get(contender.name) or _from_file(contender, sequence, opened, len(stamps))
         restart = restarts.get(contender.name)
         reason = one.error or (restart.error if restart else '')
         if reason:
@@ -216,7 +209,7 @@ def _run_sequence(job: Job) -> list[Failure]:
         write_json(
             meta_path(target),
             _meta(job, contender, one, restart, opened)
-            | {'image_size': size, 'thumbnail_scale': thumbnails.scale},
+            | {'image_size': truth.size, 'thumbnail_scale': thumbnails.scale},
         )
         write_times(job.folder, contender.name, sequence.name, one.milliseconds)
     return failures
@@ -259,18 +252,14 @@ def _meta(
         'warnings': list(opened.warnings),
     }
     if restart is not None:
-        run = restart.run()
+        counted = restart.run()
         meta['short_term'] = {
             'codes': [int(c) for c in restart.codes],
             'boxes': [list(t.box.as_tuple()) if t.box else None for t in restart.tracks],
-            'run_codes': run.codes.tolist(),
-            'run_overlaps': run.overlaps.tolist(),
+            'run_codes': counted.codes.tolist(),
+            'run_overlaps': counted.overlaps.tolist(),
         }
     return meta
-
-
-def _samples(opened: Opened, sequence: Sequence, options: RunOptions) -> Iterator[Sample]:
-    yield from as_asked(from_first_view(opened.samples), sequence, options)
 
 
 def as_asked(

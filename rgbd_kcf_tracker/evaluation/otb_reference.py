@@ -18,20 +18,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
-from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
-from rgbd_kcf_tracker.recordings.images import decode_color_bytes
-from rgbd_kcf_tracker.recordings.textfiles import read_lines
+from rgbd_kcf_tracker.evaluation import boxfiles
+from rgbd_kcf_tracker.evaluation.datasets import otb
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array as Boxes
+from rgbd_kcf_tracker.evaluation.metrics.boxes import as_array, center_error
+from rgbd_kcf_tracker.evaluation.metrics.otb import precision_at_20, precision_curve
+from rgbd_kcf_tracker.evaluation.passes import OnePass, Truth, run
 from rgbd_kcf_tracker.variants import create_tracker
 
 REFERENCE = 'KCF_GaussHog'
-PIXELS = 20.0
-
-Boxes = npt.NDArray[np.float64]
+FPS = 30.0
+"""Of the sequences, which state no stamps; ``kcf`` does not look at the time."""
 
 
 @dataclass(frozen=True)
@@ -44,81 +43,37 @@ class Comparison:
     published: float
 
 
-def precision(boxes: Boxes, truth: Boxes, pixels: float = PIXELS) -> float:
-    """Share of frames whose centre is at most ``pixels`` from the truth's, the first included.
-
-    That is OTB's measure, as published; the package's other tables leave the first frame out.
-
-    Args:
-        boxes: ``(n, 4)`` x, y, width, height.
-        truth: ``(n, 4)``, likewise.
-        pixels: radius that still counts.
-    """
-    centers = boxes[:, :2] + boxes[:, 2:] / 2
-    true_centers = truth[:, :2] + truth[:, 2:] / 2
-    error = np.hypot(*(centers - true_centers).T)
-    return float(np.mean(error <= pixels))
-
-
-def read_boxes(path: Path) -> Boxes:
-    """Boxes of an OTB file, ``(n, 4)``, separated by commas, tabs or spaces.
-
-    Raises:
-        DatasetError: naming file and line, where a line is no box.
-    """
-    rows = []
-    for number, line in enumerate(read_lines(path), start=1):
-        if not line.strip():
-            continue
-        try:
-            row = [float(value) for value in line.replace(',', ' ').split()]
-        except ValueError:
-            row = []
-        if len(row) != 4:
-            raise DatasetError(f'{path}, line {number}: expected x,y,width,height, got {line!r}')
-        rows.append(row)
-    if not rows:
-        raise DatasetError(f'{path} holds no boxes')
-    return np.array(rows)
-
-
-def track_boxes(images: Sequence[Path], first: Box) -> Boxes:
-    """Boxes of our ``kcf`` over images, ``(n, 4)`` in 0-based pixels.
-
-    Raises:
-        DatasetError: for an image that cannot be read.
-    """
-    tracker = create_tracker('kcf')
-    rows = []
-    for index, path in enumerate(images):
-        try:
-            frame = Frame(decode_color_bytes(memoryview(read_file(path, MAX_IMAGE))))
-        except RgbdKcfError as error:
-            raise DatasetError(f'{path} is not an image that can be read: {error}') from None
-        track = tracker.start(frame, first) if index == 0 else tracker.update(frame)
-        rows.append((track.box or first).as_tuple())
-    return np.array(rows)
-
-
-def compare(folder: Path) -> Comparison:
-    """Track one sequence and hold it against its published boxes.
+def boxes_of(folder: Path) -> tuple[Boxes, Boxes, Boxes]:
+    """Boxes of our ``kcf``, published and true, ``(n, 4)`` each, in 0-based pixels.
 
     Raises:
         DatasetError: where the folder is not as the module's docstring says.
+        RgbdKcfError: where a file cannot be read.
     """
-    truth = read_boxes(folder / 'groundtruth.txt')
-    published = read_boxes(folder / 'results' / f'{REFERENCE}.txt')
-    if len(published) != len(truth):
-        raise DatasetError(
-            f'{folder}: {len(published)} published boxes but {len(truth)} of ground truth'
-        )
-    images = sorted(p for p in (folder / 'rgb').glob('*') if p.suffix in ('.jpg', '.png'))
-    if len(images) < len(truth):
-        raise DatasetError(f'{folder / "rgb"}: {len(images)} images for {len(truth)} boxes')
-    # MATLAB counts pixels from 1.
-    first = Box(truth[0, 0] - 1, truth[0, 1] - 1, truth[0, 2], truth[0, 3])
-    ours = track_boxes(images[: len(truth)], first) + np.array([1, 1, 0, 0])
-    return Comparison(folder.name, len(truth), precision(ours, truth), precision(published, truth))
+    sequence = otb.find(folder, FPS)[0]
+    opened = sequence.open()
+    truth, one = Truth(), OnePass(create_tracker('kcf'))
+    run(opened.samples, truth, one)
+    one.check()
+    path = folder / 'results' / f'{REFERENCE}.txt'
+    published = boxfiles.read(path, sequence, opened, len(truth.visible))
+    ours, theirs = ([track.box for track in tracks] for tracks in (one.tracks, published))
+    return as_array(ours), as_array(theirs), as_array(truth.visible)
+
+
+def compare(folder: Path) -> Comparison:
+    """Track one sequence and hold it against its published boxes, the first frame included.
+
+    That is OTB's measure, as published; the package's other tables leave the first frame out.
+
+    Raises:
+        RgbdKcfError: as :func:`boxes_of`.
+    """
+    ours, published, truth = boxes_of(folder)
+    shares = [
+        precision_at_20(precision_curve(center_error(boxes, truth))) for boxes in (ours, published)
+    ]
+    return Comparison(folder.name, len(truth), *shares)
 
 
 def comparisons(root: Path) -> Iterator[Comparison]:
@@ -140,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; the exit status is 2 for bad input."""
     parser = argparse.ArgumentParser(
         prog='python -m rgbd_kcf_tracker.evaluation.otb_reference',
-        description=f'Precision at {PIXELS:g} px of kcf beside the published {REFERENCE} boxes.',
+        description=f'Precision at 20 px of kcf beside the published {REFERENCE} boxes.',
     )
     parser.add_argument('root', type=Path, metavar='DIR', help='folder of OTB sequences')
     root = parser.parse_args(arguments).root

@@ -3,7 +3,8 @@
 
 """One sequence, several trackers: the loop that everything measured comes from.
 
-The sequence is read (or rendered) once, and every tracker gets the same frames.
+The sequence is read (or rendered) once, and every tracker gets the same frames, turn by turn; what
+else is to be kept of them is handed in as well.
 """
 
 from __future__ import annotations
@@ -13,8 +14,11 @@ import math
 import time
 import traceback
 import zipfile
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Generic, Protocol, TypeVar
 
 import cv2
 import numpy as np
@@ -24,9 +28,11 @@ import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.evaluation.metrics import vot
-from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.track import Track, Tracker, TrackState
+
+T = TypeVar('T')
+A = TypeVar('A')
 
 THUMBNAIL_WIDTH = 320
 THUMBNAILS = 24
@@ -39,19 +45,34 @@ def trace() -> str:
     return traceback.format_exc().strip().replace(home, '')
 
 
+class Sink(Protocol):
+    """What takes the frames of a sequence, one after the other."""
+
+    def feed(self, sample: Sample) -> None:
+        """Take one more."""
+        ...
+
+
+def run(samples: Iterable[Sample], *sinks: Sink) -> None:
+    """The loop: each frame, once it is read or rendered, goes to all ``sinks`` in their order."""
+    for sample in samples:
+        for sink in sinks:
+            sink.feed(sample)
+
+
 @dataclass(eq=False)
-class OnePass:
-    """A tracker started once, on the first frame, and left alone.
+class Pass(ABC, Generic[T, A]):
+    """A tracker that is given frame after frame.
 
     Attributes:
-        tracker: what is run; None where the tracks come from a file.
-        tracks: one per frame.
+        tracker: what is run; None where the answers come from a file.
+        tracks: its answers, one per frame.
         milliseconds: of each call.
         error: why it stopped, empty while it runs.
     """
 
-    tracker: Tracker | None
-    tracks: list[Track] = field(default_factory=list)
+    tracker: T | None
+    tracks: list[A] = field(default_factory=list)
     milliseconds: list[float] = field(default_factory=list)
     error: str = ''
 
@@ -60,24 +81,38 @@ class OnePass:
         if self.error or self.tracker is None:
             return
         try:
-            self._step(self.tracker, sample)
+            before = time.perf_counter()
+            answer = self._step(self.tracker, sample)
+            self.milliseconds.append((time.perf_counter() - before) * 1000)
+            self.tracks.append(answer)
         except RgbdKcfError as error:
             self.error = f'frame {len(self.tracks)}: {error}'
         except Exception:
             self.error = f'frame {len(self.tracks)}: {trace()}'
 
-    def _step(self, tracker: Tracker, sample: Sample) -> None:
-        start = not self.tracks
-        box = sample.visible
-        if start and box is None:
+    def check(self) -> None:
+        """Raise what stopped it, if anything did.
+
+        Raises:
+            RgbdKcfError: saying in which frame, and why.
+        """
+        if self.error:
+            raise RgbdKcfError(self.error)
+
+    @abstractmethod
+    def _step(self, tracker: T, sample: Sample) -> A:
+        """The answer to one frame."""
+
+
+class OnePass(Pass[Tracker, Track]):
+    """A tracker started once, on the first frame, and left alone."""
+
+    def _step(self, tracker: Tracker, sample: Sample) -> Track:
+        if self.tracks:
+            return tracker.update(sample.frame)
+        if sample.visible is None:
             raise RgbdKcfError('the first frame has no box')
-        before = time.perf_counter()
-        if start and box is not None:
-            track = tracker.start(sample.frame, box)
-        else:
-            track = tracker.update(sample.frame)
-        self.milliseconds.append((time.perf_counter() - before) * 1000)
-        self.tracks.append(track)
+        return tracker.start(sample.frame, sample.visible)
 
 
 @dataclass(eq=False)
@@ -103,10 +138,9 @@ class WithRestarts(OnePass):
         there = ~np.isnan(overlaps)
         return vot.ShortTermRun(np.array(self.codes, np.int64)[there], overlaps[there])
 
-    def _step(self, tracker: Tracker, sample: Sample) -> None:
+    def _step(self, tracker: Tracker, sample: Sample) -> Track:
         box = sample.visible if sample.judged else None
         self._wait = max(0, self._wait - 1)
-        before = time.perf_counter()
         track, code, overlap = _NO_BOX, vot.Code.SKIPPED, math.nan if box is None else 0.0
         if not self._running:
             if box is not None and self._wait == 0:
@@ -119,16 +153,42 @@ class WithRestarts(OnePass):
                 overlap = _best_overlap(track.box, box, sample.body)
                 if overlap <= 0:
                     code, self._running, self._wait = vot.Code.FAILURE, False, vot.SKIP
-        self.milliseconds.append((time.perf_counter() - before) * 1000)
-        self.tracks.append(track)
         self.codes.append(code)
         self.overlaps.append(overlap)
+        return track
 
 
 def _best_overlap(box: Box | None, visible: Box, body: Box | None) -> float:
     if box is None:
         return 0.0
     return max(box.iou(visible), box.iou(body) if body is not None else 0.0)
+
+
+@dataclass(slots=True)
+class Truth:
+    """Notes what is true of the frames of a sequence, one entry per frame.
+
+    Attributes:
+        size: width and height of the last image.
+        stamps_ns: of the frames.
+        visible, bodies, fractions, judged: see :class:`Sample`.
+    """
+
+    size: tuple[int, int] = (0, 0)
+    stamps_ns: list[int] = field(default_factory=list)
+    visible: list[Box | None] = field(default_factory=list)
+    bodies: list[Box | None] = field(default_factory=list)
+    fractions: list[float | None] = field(default_factory=list)
+    judged: list[bool] = field(default_factory=list)
+
+    def feed(self, sample: Sample) -> None:
+        """Note one more."""
+        self.size = sample.frame.width, sample.frame.height
+        self.stamps_ns.append(sample.frame.stamp_ns)
+        self.visible.append(sample.visible)
+        self.bodies.append(sample.body)
+        self.fractions.append(sample.fraction)
+        self.judged.append(sample.judged)
 
 
 class Thumbnails:
@@ -141,8 +201,9 @@ class Thumbnails:
         self._index = 0
         self.scale = 1.0
 
-    def feed(self, frame: Frame) -> None:
+    def feed(self, sample: Sample) -> None:
         """Keep the frame's picture if it falls on the grid; the grid widens when it is full."""
+        frame = sample.frame
         if self._index % self._step == 0:
             self.scale = min(1.0, THUMBNAIL_WIDTH / frame.width)
             size = (round(frame.width * self.scale), round(frame.height * self.scale))

@@ -11,7 +11,7 @@ sways before a textured wall, and for a third of the time a board that hides it.
 from __future__ import annotations
 
 import gc
-import time
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -20,9 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.evaluation.contenders import Contender
+from rgbd_kcf_tracker.evaluation.datasets.base import Sample
+from rgbd_kcf_tracker.evaluation.passes import OnePass, run
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.track import Tracker
 
 RATE = 30.0
 WALL, FIGURE, BOARD = 4.0, 2.5, 1.5
@@ -164,27 +165,25 @@ def measure(
     frame to end early, it answers with the times it has.
     """
     scene = SpeedScene(setting)
-    trackers: list[Tracker] = [c.make() for c in contenders]
-    speeds = [Speed(c.name, setting) for c in contenders]
+    passes = [OnePass(contender.make()) for contender in contenders]
+    samples = (Sample(frame, scene.box(index)) for index, frame in enumerate(scene.frames(count)))
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     gc.collect()
     try:
-        first = scene.frame(0)
-        for tracker in trackers:
-            tracker.start(first, scene.box(0))
-        for index in range(1, count):
-            if stopped():
-                break
-            frame = scene.frame(index)
-            for tracker, speed in zip(trackers, speeds, strict=True):
-                begun = time.perf_counter()
-                track = tracker.update(frame)
-                spent = (time.perf_counter() - begun) * 1e3
-                (speed.searching if track.box is None else speed.tracking).append(spent)
+        run(itertools.takewhile(lambda _: not stopped(), samples), *passes)
     finally:
         cv2.setNumThreads(threads)
-    return speeds
+    return [_speed(c.name, setting, one) for c, one in zip(contenders, passes, strict=True)]
+
+
+def _speed(name: str, setting: Setting, one: OnePass) -> Speed:
+    one.check()
+    speed = Speed(name, setting)
+    answers = itertools.islice(zip(one.tracks, one.milliseconds, strict=True), 1, None)
+    for track, spent in answers:  # the first is the start
+        (speed.searching if track.box is None else speed.tracking).append(spent)
+    return speed
 
 
 @dataclass(frozen=True, slots=True)

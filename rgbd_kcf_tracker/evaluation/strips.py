@@ -16,7 +16,9 @@ from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.jobs import thumbnails_path
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.passes import read_thumbnails
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.images import decode_color_bytes
+from rgbd_kcf_tracker.recordings.overlay import draw_box
 
 FRAMES = 8
 COLUMNS = 4
@@ -72,7 +74,7 @@ def strip(
                 missing.append(name)
             else:  # the main tracker's line is thin, on top: a box below it shows as a rim
                 thickness = 2 if name == main else 4
-                _rectangle(image, box * scale, _bgr(palette[name]), thickness)
+                draw_box(image, Box(*(box * scale)), _bgr(palette[name]), thickness)
         _label(image, f'{i}', missing, palette, np.isnan(truth[i, 0]))
         tiles.append(image)
     if not tiles:
@@ -113,11 +115,6 @@ def _montage(tiles: list[Picture]) -> Picture:
         y, x = (n // COLUMNS) * (height + gap), (n % COLUMNS) * (width + gap)
         sheet[y : y + height, x : x + width] = tile[:height, :width]
     return sheet
-
-
-def _rectangle(image: Picture, box: Array, color: tuple[int, int, int], thickness: int) -> None:
-    x, y, width, height = (round(float(v)) for v in box)
-    cv2.rectangle(image, (x, y), (x + width, y + height), color, thickness, cv2.LINE_AA)
 
 
 def _dashed(image: Picture, box: Array) -> None:

@@ -8,9 +8,10 @@ from __future__ import annotations
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import NodeParameters
-from rgbd_kcf_tracker.metric.perceive.people import PersonFinder
+from rgbd_kcf_tracker.metric.people import PersonFinder
 
-PERIOD_NS = 200_000_000
+PERIOD_NS = 180_000_000
+"""Somewhat less than a fifth of a second, so that stamps may jitter."""
 
 
 class AutoInit:
@@ -21,15 +22,8 @@ class AutoInit:
     """
 
     def __init__(self, settings: NodeParameters) -> None:
-        self._finder = PersonFinder(
-            settings.auto_init_near, settings.auto_init_far, settings.auto_init_confirm
-        )
+        self._finder = PersonFinder(settings.auto_init_near, settings.auto_init_far)
         self._looked: int | None = None
-
-    @property
-    def confirms(self) -> bool:
-        """Whether the people detector is asked; not every OpenCV has one."""
-        return self._finder.confirms
 
     def __call__(self, frame: Frame) -> Box | None:
         """The nearest person, if there is one and it is time to look again."""

@@ -14,11 +14,9 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-import numpy as np
-
 from rgbd_kcf_tracker.live.processor import Camera, Capture
 from rgbd_kcf_tracker.live.statistics import Statistics
-from rgbd_kcf_tracker.recordings.images import as_bytes
+from rgbd_kcf_tracker.live.timeline import StampRepair
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer, patient_pairer
 
@@ -29,27 +27,6 @@ PATIENT_WAIT_NS = 1_000_000_000
 HELD = 5
 REMEMBERED = 60
 """Colour images that went out alone and are remembered: two seconds at 30 Hz."""
-
-
-class StampRepair:
-    """Stamps of one stream, those that say nothing replaced by the time of arrival."""
-
-    def __init__(self) -> None:
-        self._stamp: int | None = None
-        self._repaired = 0
-        self._arrival = 0
-        self._data: Any = None
-
-    def __call__(self, stamp_ns: int, arrival_ns: int, data: Any) -> int | None:
-        """The stamp to pair by; None where the message is the last one over again."""
-        repaired = stamp_ns
-        if stamp_ns == self._stamp:
-            if _same(data, self._data):
-                return None
-            repaired = self._repaired + max(arrival_ns - self._arrival, 1)
-        self._stamp, self._data = stamp_ns, data
-        self._repaired, self._arrival = repaired, arrival_ns
-        return repaired
 
 
 class DepthFit:
@@ -246,10 +223,3 @@ class Intake:
         held = [Capture(c.color, c.depth, self._camera, now_ns) for c in self._held]
         self._held.clear()
         return held
-
-
-def _same(data: Any, other: Any) -> bool:
-    one, two = as_bytes(data), as_bytes(other)
-    return len(one) == len(two) and np.array_equal(
-        np.frombuffer(one, np.uint8), np.frombuffer(two, np.uint8)
-    )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
@@ -22,6 +23,7 @@ from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Moment, Timeline
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
@@ -105,6 +107,7 @@ class Processor:
         fault: told of each fault by kind and in words.
         color_transport, depth_transport: how the images are packed.
         places: where the camera is, None where nobody tells.
+        max_pixels: of the largest image that is read.
     """
 
     def __init__(
@@ -118,6 +121,7 @@ class Processor:
         color_transport: str = RAW,
         depth_transport: str = RAW,
         places: CameraPlaces | None = None,
+        max_pixels: int = MAX_PIXELS,
     ) -> None:
         self.session = session
         self._publishers = publishers
@@ -130,11 +134,13 @@ class Processor:
         self._frame_id: str | None = None
         self._restarts = self._steady = 0
         self.on_restart: Callable[[], None] | None = None
-        self._decode_color: Callable[[Any], ColorImage] = (
-            decode_color if color_transport == RAW else decode_compressed_color
+        self._decode_color: Callable[[Any], ColorImage] = partial(
+            decode_color if color_transport == RAW else decode_compressed_color,
+            max_pixels=max_pixels,
         )
-        self._decode_depth: Callable[[Any], DepthImage] = (
-            decode_depth if depth_transport == RAW else decode_compressed_depth
+        self._decode_depth: Callable[[Any], DepthImage] = partial(
+            decode_depth if depth_transport == RAW else decode_compressed_depth,
+            max_pixels=max_pixels,
         )
 
     def __call__(self, capture: Capture) -> None:

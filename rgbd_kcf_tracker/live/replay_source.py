@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.frame import Frame
@@ -23,10 +23,13 @@ from rgbd_kcf_tracker.recordings.bags import BagRecording
 from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
-from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, ReadOptions
+from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
 
 FOLDER_TOPICS = GENERIC
 """Where the images of a sequence folder go: the tracker's own names, which need no remapping."""
@@ -44,7 +47,7 @@ class SourceTopic:
     count: int
 
 
-class ReplaySource:
+class ReplaySource(Closing):
     """Opens a recording for replay. Use it in a ``with`` block.
 
     Args:
@@ -150,12 +153,6 @@ class ReplaySource:
         """Close the files."""
         self._messages.close()
 
-    def __enter__(self) -> ReplaySource:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 class _BagMessages:
     """Messages of a bag of any format."""
@@ -176,10 +173,20 @@ class _BagMessages:
             self.depth_topic = self._recording.topics.depth
             self.info_topic = self._recording.topics.info
         self.warnings += self._bag.warnings
-        self._convert = typestore(False).ros1_to_cdr if self._bag.ros1 else None
-        self.topics = [
-            SourceTopic(t.name, t.type, len(t)) for t in self._bag.topics.values() if self._can(t)
-        ]
+        self._translate: Ros1Translator | None = None
+        if self._bag.ros1:  # brings all of rosbags
+            from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
+
+            self._translate = Ros1Translator(self._bag)
+        self.topics = []
+        for topic in self._bag.topics.values():
+            kind = self._kind(topic)
+            if kind is None:
+                self.warnings.append(
+                    f'{topic.name} is left out: the bag does not say what {topic.type} is'
+                )
+            else:
+                self.topics.append(SourceTopic(topic.name, kind, len(topic)))
 
     def _open(self, path: Path, options: ReadOptions, camera_needed: bool) -> None:
         """Find the camera as the command line does; a bag without one is replayed all the same."""
@@ -199,11 +206,12 @@ class _BagMessages:
                 raise RecordingError(problem) from None
             self.warnings.append(f'replayed as it is, without waiting for answers: {problem}')
 
-    def _can(self, topic: Topic) -> bool:
-        if not self._bag.ros1 or topic.type in typestore(False).fielddefs:
-            return True
-        self.warnings.append(f'{topic.name} is left out: ROS 2 has no {topic.type}')
-        return False
+    def _kind(self, topic: Topic) -> str | None:
+        """The type that goes out, None where it is not known."""
+        if self._translate is None:
+            return topic.type
+        found = self._translate.type_of(topic.type)
+        return None if found is None else found[0]
 
     def read(self, names: frozenset[str], start_s: float) -> Iterator[Message]:
         first: int | None = None
@@ -214,13 +222,12 @@ class _BagMessages:
             if (time_ns - first) * 1e-9 < start_s:
                 continue
             data: Any = self._bag.read(topic, index)
-            if self._convert is not None:
+            if self._translate is not None:
                 try:
-                    data = bytes(self._convert(data, topic.type))
-                except Exception as error:  # a damaged message makes the library raise anything
+                    data = bytes(self._translate.data(topic.type, data))
+                except RecordingError as error:
                     raise RecordingError(
-                        f'{self._bag.path}: message {index} of {topic.name} is no {topic.type}: '
-                        f'{error or type(error).__name__}'
+                        f'{self._bag.path}: message {index} of {topic.name}: {error}'
                     ) from None
             yield Message(topic.name, time_ns, data, self._role(topic.name), topic.stamp_ns[index])
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE
 from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
@@ -41,13 +42,10 @@ class NodeParameters(Parameters):
     )
     auto_init: bool = parameter(
         False,
-        'Choose the target without being told: the nearest upright person-sized thing in range.',
+        'Choose the target without being told: the nearest person in range, by depth and motion.',
     )
     auto_init_again: bool = parameter(
         False, 'With auto_init: choose again when the target is lost, instead of searching on.'
-    )
-    auto_init_confirm: bool = parameter(
-        True, "With auto_init: take only what OpenCV's HOG people detector also finds."
     )
     auto_init_near: float = parameter(
         0.5, 'Nearest distance at which auto_init looks.', unit='m', minimum=0.1, maximum=20.0
@@ -159,6 +157,14 @@ class NodeParameters(Parameters):
     qos_depth: int = parameter(
         5, 'QoS history depth of the image subscriptions.', unit='messages', minimum=1, maximum=1000
     )
+    max_pixels: int = parameter(
+        MAX_PIXELS,
+        'Pixels of the largest image that is read: a few kB of PNG can claim an image that takes '
+        'seconds to unpack.',
+        unit='px',
+        minimum=1,
+        maximum=MAX_SIDE * MAX_SIDE,
+    )
     autostart: bool = parameter(
         True, 'Configure and activate at once; false waits for a lifecycle manager.'
     )
@@ -172,6 +178,7 @@ READ_ONLY = frozenset(
         'depth_transport',
         'reliability',
         'qos_depth',
+        'max_pixels',
         'autostart',
         'target_frame',
         'fixed_frame',

@@ -1,16 +1,22 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A time that only moves forward, for trackers that think in seconds, out of stamps that may not.
+"""Time is judged here: one that only moves forward, out of stamps that may not.
 
 Cameras send stamps that are zero, equal, jump back (a bag that loops) or are years ahead (a clock
 not set). Headers of results always copy what the camera sent; this is the time that the tracker is
-given. As long as stamps behave, it is the stamp itself.
+given. As long as stamps behave, it is the stamp itself. Before images are paired, stamps that say
+nothing are replaced (:class:`StampRepair`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rgbd_kcf_tracker.recordings.images import as_bytes
 
 NANOSECONDS = 1_000_000_000
 LARGEST_STEP_NS = 60 * NANOSECONDS
@@ -67,3 +73,31 @@ class Timeline:
         self._time += step
         self._stamp, self._arrival = stamp_ns, arrival_ns
         return Moment(self._time, jumped, restarted)
+
+
+class StampRepair:
+    """Stamps of one stream, those that say nothing replaced by the time of arrival."""
+
+    def __init__(self) -> None:
+        self._stamp: int | None = None
+        self._repaired = 0
+        self._arrival = 0
+        self._data: Any = None
+
+    def __call__(self, stamp_ns: int, arrival_ns: int, data: Any) -> int | None:
+        """The stamp to pair by; None where the message is the last one over again."""
+        repaired = stamp_ns
+        if stamp_ns == self._stamp:
+            if _same(data, self._data):
+                return None
+            repaired = self._repaired + max(arrival_ns - self._arrival, 1)
+        self._stamp, self._data = stamp_ns, data
+        self._repaired, self._arrival = repaired, arrival_ns
+        return repaired
+
+
+def _same(data: Any, other: Any) -> bool:
+    one, two = as_bytes(data), as_bytes(other)
+    return len(one) == len(two) and np.array_equal(
+        np.frombuffer(one, np.uint8), np.frombuffer(two, np.uint8)
+    )

@@ -60,10 +60,14 @@ class ByLook:
         frame: the first.
         box: the target in it.
         parameters: of the tracker.
+
+    Attributes:
+        response: the filter's in the last look against its own recent mean.
     """
 
     def __init__(self, frame: Frame, box: Box, parameters: MetricParameters) -> None:
         self._parameters = parameters
+        self.response: float | None = None
         self._cx, self._cy, self._scale = box.cx, box.cy, 1.0
         self._appearance = Appearance(
             frame.color,
@@ -96,6 +100,7 @@ class ByLook:
                 if other.ratio > sighting.ratio + BETTER:
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio
+        self.response = sighting.ratio
         return None if self._hidden else self._taken(frame, sighting, dt)
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
@@ -103,6 +108,7 @@ class ByLook:
         self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+        self.response = sighting.ratio
         if sighting.ratio < self._parameters.seen_ratio:
             return None
         return self._taken(frame, sighting, dt)

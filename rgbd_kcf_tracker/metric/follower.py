@@ -55,6 +55,8 @@ class Follower:
     Attributes:
         person: the target as one of the crowd, None while depth says nothing of it.
         seen: its silhouette in the last frame, None where it has none.
+        response: the filter's in the last frame against its own recent mean, None where it was not
+            asked.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Follower:
         self._since = crowd.time
         self.person: Person | None = None
         self.seen: Silhouette | None = None
+        self.response: float | None = None
         if account is not None:
             self._lock(account, box)
             self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
@@ -108,10 +111,13 @@ class Follower:
         """
         self._account = account
         self.seen = None
+        if self._look is not None:
+            self._look.response = None
         if self._surface is None:
             track = self._by_look(frame, account, dt)
         else:
             track = self._by_surface(frame, account, view, dt, self._surface)
+        self.response = None if self._look is None else self._look.response
         self._hidden_for = 0.0 if track.box is not None else self._hidden_for + dt
         self.track = track
         return track

@@ -118,13 +118,19 @@ class MetricTargets:
         """The last track of a target: after :meth:`add`, that of its first frame."""
         return dataclasses.replace(self._followers[number].track, id=number)
 
+    def person(self, number: int) -> Person | None:
+        """Whom an id belongs to, None where that is not known or forgotten."""
+        for person in self._crowd.people:
+            if self._names.get(person.number) == number:
+                return person
+        return None
+
     # -- parts ------------------------------------------------------------------------------------
 
     def _perceive(self, frame: Frame) -> float:
         dt = 0.0
         if self._stamp_ns is not None:
-            dt = (frame.stamp_ns - self._stamp_ns) * 1e-9
-            dt = min(max(dt, SHORTEST_STEP), LONGEST_STEP)
+            dt = frame.seconds_since(self._stamp_ns, SHORTEST_STEP, LONGEST_STEP)
         self._stamp_ns = frame.stamp_ns
         self._time += dt
         self._frame = frame

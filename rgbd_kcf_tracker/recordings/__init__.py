@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
+from rgbd_kcf_tracker.lazy import lazily
+
 TYPE_CHECKING = False  # that of typing costs an import
 if TYPE_CHECKING:
-    from typing import Any
-
     from rgbd_kcf_tracker.recordings.bag_writer import (
         GENERIC,
         KINECT2_HD,
@@ -73,46 +73,18 @@ HOW_TO_GET_THEM = (
     '(docs/install.md)'
 )
 
-_HOMES = {
-    'BagWriter': 'bag_writer',
-    'CameraTopics': 'bag_writer',
-    'GENERIC': 'bag_writer',
-    'KINECT2_HD': 'bag_writer',
-    'KINECT2_QHD': 'bag_writer',
-    'KINECT2_SD': 'bag_writer',
-    'MotWriter': 'mot',
-    'Pair': 'pairing',
-    'PairingCounts': 'pairing',
-    'ReadOptions': 'recording',
-    'Recording': 'recording',
-    'RecordingInfo': 'recording',
-    'SequenceWriter': 'sequence_writer',
-    'Sightings': 'mot',
-    'StampPairer': 'pairing',
-    'StreamInfo': 'recording',
-    'TrackCsvWriter': 'results',
-    'TracksCsvWriter': 'results',
-    'VideoWriter': 'video',
-    'decode_color': 'images',
-    'decode_compressed_color': 'images',
-    'decode_compressed_depth': 'images',
-    'decode_depth': 'images',
-    'draw_track': 'overlay',
-    'open_recording': 'opening',
-    'read_mot': 'mot',
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Import what is used when it is used: a node that decodes images needs no library for bags."""
-    from importlib import import_module
-
-    if name not in _HOMES:
-        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{_HOMES[name]}'), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+__getattr__, __dir__ = lazily(
+    __name__,
+    {
+        'bag_writer': 'BagWriter CameraTopics GENERIC KINECT2_HD KINECT2_QHD KINECT2_SD',
+        'images': 'decode_color decode_compressed_color decode_compressed_depth decode_depth',
+        'mot': 'MotWriter Sightings read_mot',
+        'opening': 'open_recording',
+        'overlay': 'draw_track',
+        'pairing': 'Pair PairingCounts StampPairer',
+        'recording': 'ReadOptions Recording RecordingInfo StreamInfo',
+        'results': 'TrackCsvWriter TracksCsvWriter',
+        'sequence_writer': 'SequenceWriter',
+        'video': 'VideoWriter',
+    },
+)

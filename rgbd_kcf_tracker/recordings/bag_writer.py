@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 from rgbd_kcf_tracker.errors import ParameterError
@@ -21,6 +20,7 @@ from rgbd_kcf_tracker.recordings.encoding import (
 from rgbd_kcf_tracker.recordings.foxglove import DEFINITIONS, image_annotations
 from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter
 from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES, register
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
@@ -64,7 +64,7 @@ GENERIC = CameraTopics('/color/image', '/depth/image', '/color/camera_info', 'ca
 """The tracker node's own names: a bag with these needs no remapping."""
 
 
-class BagWriter:
+class BagWriter(FrameWriter):
     """Writes mcap: images as a camera sends them, and the tracker's topics beside them.
 
     Every message's time of recording is its frame's stamp. When a ``write`` returns, the system has
@@ -163,20 +163,9 @@ class BagWriter:
         self._writer.write(TRUTH_BODY, self._make.polygon(header, body), frame.stamp_ns)
         self._writer.flush()
 
-    def close(self) -> None:
+    def close(self, whole: bool = True) -> None:
         """Write the index and close the file; see :meth:`McapWriter.close`."""
-        self._writer.close()
-
-    def __enter__(self) -> BagWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._writer.__exit__(kind, error, trace)
+        self._writer.close(whole)
 
     def _header(self, frame: Frame) -> Any:
         return self._make.header(frame.stamp_ns, self.topics.frame_id)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
@@ -36,13 +35,13 @@ from rgbd_kcf_tracker.recordings.messages import (
     intrinsics_from_info,
 )
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
-from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo
+from rgbd_kcf_tracker.recordings.recording import Closing, ReadOptions, RecordingInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
 from rgbd_kcf_tracker.recordings.topics import ChosenTopics, choose_topics
 
 
-class BagRecording:
+class BagRecording(Closing):
     """A :class:`Recording` of a bag of any format; see :class:`RawBag` for what opens.
 
     Raises:
@@ -123,17 +122,6 @@ class BagRecording:
     def close(self) -> None:
         """See :meth:`Recording.close`."""
         self.bag.close()
-
-    def __enter__(self) -> BagRecording:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _choose(self, options: ReadOptions) -> ChosenTopics:
         topics = self.bag.topics.values()

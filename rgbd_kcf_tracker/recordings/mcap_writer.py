@@ -5,15 +5,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from types import TracebackType
 from typing import Any, cast
 
 from mcap.writer import CompressionType, Writer
 
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
-from rgbd_kcf_tracker.recordings.outputs import OutputFile, cannot_write
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile, cannot_write
 from rgbd_kcf_tracker.recordings.rawbag import typestore
 from rgbd_kcf_tracker.recordings.storage import Definition
 
@@ -25,7 +23,7 @@ DEFAULT_COMPRESSION = 'zstd'
 _CHUNK = 256 * 1024
 
 
-class McapWriter:
+class McapWriter(FrameWriter):
     """Writes messages as they come.
 
     Args:
@@ -138,21 +136,6 @@ class McapWriter:
             self.output.end(whole=False, anything=bool(self._counts))
             raise RecordingError(cannot_write(self.path, error)) from None
         self.output.end(whole=whole, anything=bool(self._counts))
-
-    def __enter__(self) -> McapWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            with contextlib.suppress(RecordingError):  # the error before says more
-                self.close(whole=False)
 
     def _register(self, topic: str, kind: str, definition: Definition | None) -> int:
         if definition is None or definition.encoding == 'ros1msg':

@@ -19,14 +19,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.outputs import OutputFile
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile
 from rgbd_kcf_tracker.recordings.textfiles import read_lines
 from rgbd_kcf_tracker.track import Track
 
@@ -175,7 +174,7 @@ def _parse(place: str, line: str) -> tuple[float, ...]:
     return frame - 1, who, x, y, width, height, score, share, *position
 
 
-class MotWriter:
+class MotWriter(FrameWriter):
     """Writes a tracker's answers as MOT Challenge text, each frame as it comes.
 
     A run that is interrupted leaves all frames up to then.
@@ -209,17 +208,6 @@ class MotWriter:
             RecordingError: where it cannot be written.
         """
         self.output.end(whole=whole, anything=True)
-
-    def __enter__(self) -> MotWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close(whole=error is None)
 
 
 def mot_text(sightings: Sightings) -> str:

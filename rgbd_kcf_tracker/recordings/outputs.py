@@ -18,15 +18,18 @@ import logging
 import os
 import shutil
 import stat
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import TracebackType
 from typing import BinaryIO, TypeVar
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.files import kind_of, why
 
 T = TypeVar('T')
+W = TypeVar('W', bound='FrameWriter')
 _LOG = logging.getLogger(__name__)
 
 Identity = tuple[int, int]
@@ -264,6 +267,36 @@ class OutputFolder:
 
 def _tell_kept(path: Path, place: Path) -> None:
     _LOG.warning('%s is left as it was; what was written of the new one is %s', path, place)
+
+
+class FrameWriter(ABC):
+    """What is written frame by frame. Use it in a ``with`` block, or :meth:`close` it."""
+
+    @abstractmethod
+    def close(self, whole: bool = True) -> None:
+        """Finish what was written; nothing is left where there is nothing in it.
+
+        Args:
+            whole: all is written: only then does it replace another.
+
+        Raises:
+            RecordingError: where it cannot be written.
+        """
+
+    def __enter__(self: W) -> W:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is None:
+            self.close()
+            return
+        with contextlib.suppress(RecordingError):  # the error before says more
+            self.close(whole=False)
 
 
 @contextlib.contextmanager

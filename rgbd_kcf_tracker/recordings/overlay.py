@@ -52,11 +52,11 @@ def draw_track(
     color = STATE_COLORS[track.state]
     scale, thickness = _sizes(out)
     if truth is not None:
-        _rectangle(out, truth, (0, 0, 0), 3)
-        _rectangle(out, truth, TRUTH_COLOR, 1)
+        draw_box(out, truth, (0, 0, 0), 3)
+        draw_box(out, truth, TRUTH_COLOR, 1)
     if track.box is not None:
-        _rectangle(out, track.box, (0, 0, 0), thickness + 2)
-        _rectangle(out, track.box, color, thickness)
+        draw_box(out, track.box, (0, 0, 0), thickness + 2)
+        draw_box(out, track.box, color, thickness)
     _bar(out, _words(track), caption, scale, color)
     return out
 
@@ -82,8 +82,8 @@ def draw_tracks(
             continue
         seen += 1
         color = id_color(who)
-        _rectangle(out, track.box, (0, 0, 0), thickness + 2)
-        _rectangle(out, track.box, color, thickness)
+        draw_box(out, track.box, (0, 0, 0), thickness + 2)
+        draw_box(out, track.box, color, thickness)
         _label(out, str(who), track.box, color, scale, thickness)
     state = TrackState.TRACKING if seen else TrackState.OCCLUDED
     words = f'{seen} in view' + (f', {len(tracks) - seen} not' if seen < len(tracks) else '')
@@ -165,9 +165,10 @@ def _text(
     cv2.putText(image, words, at, _FONT, scale, (255, 255, 255), weight, cv2.LINE_AA)
 
 
-def _rectangle(
+def draw_box(
     image: npt.NDArray[np.uint8], box: Box, color: tuple[int, int, int], thickness: int
 ) -> None:
+    """Draw the outline of a box into a picture, wherever it lies."""
     # Far outside the image OpenCV's fixed-point coordinates would overflow.
     height, width = image.shape[:2]
     shown = Box(box.x + width, box.y + height, box.width, box.height).clipped(3 * width, 3 * height)

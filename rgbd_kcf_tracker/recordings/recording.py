@@ -5,16 +5,18 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
+
+C = TypeVar('C', bound='Closing')
 
 MIN_FPS, MAX_FPS = 1e-3, 1e6
 
@@ -115,6 +117,20 @@ class RecordingInfo:
     warnings: tuple[str, ...] = field(default=())
 
 
+class Closing(ABC):
+    """What is closed at the end of its ``with`` block."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the files."""
+
+    def __enter__(self: C) -> C:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
 class Recording(Protocol):
     """A source of frames in time order. Use it in a ``with`` block, or :meth:`close` it.
 
@@ -158,9 +174,4 @@ class Recording(Protocol):
 
     def __enter__(self) -> Recording: ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None: ...
+    def __exit__(self, *_: object) -> None: ...

@@ -9,10 +9,9 @@ import math
 import os
 import sys
 from collections.abc import Mapping
-from types import TracebackType
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.outputs import OutputFile, cannot_write
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile, cannot_write
 from rgbd_kcf_tracker.track import Track
 
 HEADER = ('frame', 'stamp_ns', 'x', 'y', 'width', 'height', 'state', 'score', 'depth_m')
@@ -28,7 +27,7 @@ def row(number: int, stamp_ns: int, track: Track) -> str:
     return ','.join(cells)
 
 
-class TrackCsvWriter:
+class TrackCsvWriter(FrameWriter):
     """Writes ``frame,stamp_ns,x,y,width,height,state,score,depth_m``, each row as it comes.
 
     Boxes are in pixels with four decimals, score from 0 to 1, depth in metres; cells are empty
@@ -76,17 +75,6 @@ class TrackCsvWriter:
         """
         if self.output is not None:
             self.output.end(whole=whole, anything=self._rows > 0)
-
-    def __enter__(self) -> TrackCsvWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close(whole=error is None)
 
     def _write(self, line: str) -> None:
         if self.output is not None:

@@ -10,7 +10,6 @@ import json
 import os
 from collections.abc import Mapping
 from io import FileIO
-from types import TracebackType
 from typing import Any, Protocol
 
 import cv2
@@ -21,7 +20,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, Sightings, mot_text
-from rgbd_kcf_tracker.recordings.outputs import OutputFolder, cannot_write
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write
 from rgbd_kcf_tracker.recordings.textfiles import format_box
 
 # At the end of the name of an image that is being written.
@@ -65,7 +64,7 @@ class PersonTruth(Protocol):
         """In the camera's optical frame, metres."""
 
 
-class SequenceWriter:
+class SequenceWriter(FrameWriter):
     """Writes ``rgb/``, ``depth/`` (16-bit PNG, millimetres) and the text files beside them.
 
     Lines are written with their images, so a run that is interrupted or killed leaves a sequence
@@ -165,21 +164,6 @@ class SequenceWriter:
             with contextlib.suppress(OSError):  # a full disk was told when it was written
                 file.close()
         self.output.end(whole=whole, anything=self._count > 0)
-
-    def __enter__(self) -> SequenceWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            with contextlib.suppress(RecordingError):  # the error before says more
-                self.close(whole=False)
 
     def _write_people(self, people: Mapping[int, PersonTruth]) -> None:
         shown = {who: truth for who, truth in people.items() if truth.shown is not None}

@@ -6,33 +6,35 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.containers import MAX_SIDE, inspect
-from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, cannot_read, read_file
-from rgbd_kcf_tracker.recordings.images import (
-    ColorImage,
-    DepthImage,
-    EncodingError,
-    decode_color_bytes,
-    decode_depth_bytes,
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
+from rgbd_kcf_tracker.recordings.imagefiles import (
+    ImageFrames,
+    depths_beside,
+    even_stamps,
+    image_files,
 )
-from rgbd_kcf_tracker.recordings.recording import ReadOptions, RecordingInfo, StreamInfo
+from rgbd_kcf_tracker.recordings.recording import (
+    NO_DEPTH,
+    Closing,
+    ReadOptions,
+    RecordingInfo,
+    StreamInfo,
+)
 from rgbd_kcf_tracker.recordings.textfiles import (
     folder_intrinsics,
     known,
-    natural_key,
     read_boxes,
     read_stamps,
 )
 
-IMAGE_SUFFIXES = frozenset({'.png', '.jpg', '.jpeg', '.tif', '.tiff'})
 COLOR_FOLDERS = ('rgb', 'color', 'img')
 DEPTH_FOLDER = 'depth'
 
@@ -42,7 +44,7 @@ def is_sequence_folder(path: Path) -> bool:
     return any((path / name).is_dir() for name in COLOR_FOLDERS)
 
 
-class SequenceFolder:
+class SequenceFolder(Closing):
     """A :class:`Recording` of a folder with ``rgb/``.
 
     Read where they are there: ``depth/``, ``groundtruth.txt``,
@@ -58,40 +60,34 @@ class SequenceFolder:
         self.path = path
         self.name = path.resolve().name
         self.warnings: list[str] = []
-        self._max_pixels = options.max_pixels
         self._color_folder = next(path / n for n in COLOR_FOLDERS if (path / n).is_dir())
-        self._colors = _images(self._color_folder)
-        if not self._colors:
-            raise RecordingError(f'{self._color_folder} holds no images (PNG, JPEG or TIFF)')
-        self._depths = self._find_depths(options)
-        self._stamps = self._read_stamps(options)
-        self.intrinsics: Intrinsics | None = options.intrinsics
-        if self.intrinsics is None:
-            self.intrinsics = folder_intrinsics(path)
+        colors = image_files(self._color_folder)
+        self._files = ImageFrames(
+            colors,
+            self._find_depths(colors, options),
+            self._read_stamps(len(colors), options),
+            options.intrinsics or folder_intrinsics(path),
+            options.max_pixels,
+        )
+        self.intrinsics: Intrinsics | None = self._files.intrinsics
         self.groundtruth = self._read_truth('groundtruth.txt')
         self.groundtruth_body = known(self._read_truth('groundtruth_body.txt'))
 
     def __len__(self) -> int:
-        return len(self._colors)
+        return len(self._files)
 
     def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
         """See :meth:`Recording.frames`."""
         for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
-            path = self._colors[index]
-            color = self._decode_color(path)
-            depth_path = self._depths[index]
-            depth = None if depth_path is None else self._decode_depth(depth_path)
-            try:
-                yield Frame(color, depth, self._stamps[index], self.intrinsics)
-            except ImageError as error:
-                raise ImageError(f'{depth_path}: {error}') from None
+            yield self._files.frame(index, self.warnings.append)
 
     def info(self) -> RecordingInfo:
         """See :meth:`Recording.info`."""
-        gaps = [b - a for a, b in pairwise(self._stamps) if b > a]
+        stamps = self._files.stamps_ns
+        gaps = [b - a for a, b in pairwise(stamps) if b > a]
         rate = 1e9 / statistics.median(gaps) if gaps else None
-        depths = [p for p in self._depths if p is not None]
-        streams = [_stream(self._color_folder.name, self._colors, rate, 'color')]
+        depths = [p for p in self._files.depths if p is not None]
+        streams = [_stream(self._color_folder.name, self._files.colors, rate, 'color')]
         if depths:
             streams.append(_stream(DEPTH_FOLDER, depths, rate, 'depth'))
         for name, boxes in (
@@ -106,7 +102,7 @@ class SequenceFolder:
             kind='sequence folder',
             frames=len(self),
             frames_with_depth=len(depths),
-            duration_s=(self._stamps[-1] - self._stamps[0]) / 1e9,
+            duration_s=(stamps[-1] - stamps[0]) / 1e9,
             rate_hz=rate,
             streams=tuple(streams),
             intrinsics=self.intrinsics,
@@ -117,23 +113,13 @@ class SequenceFolder:
     def close(self) -> None:
         """Nothing stays open."""
 
-    def __enter__(self) -> SequenceFolder:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def _find_depths(self, options: ReadOptions) -> list[Path | None]:
+    def _find_depths(
+        self, colors: tuple[Path, ...], options: ReadOptions
+    ) -> tuple[Path | None, ...]:
         folder = self.path / DEPTH_FOLDER
-        if not folder.is_dir() or options.depth_topic == 'none':
-            return [None] * len(self._colors)
-        by_stem = {p.stem: p for p in _images(folder)}
-        depths = [by_stem.get(p.stem) for p in self._colors]
+        if not folder.is_dir() or options.depth_topic == NO_DEPTH:
+            return ()
+        depths = depths_beside(colors, folder)
         missing = sum(p is None for p in depths)
         if missing == len(depths):
             raise RecordingError(
@@ -144,14 +130,14 @@ class SequenceFolder:
             self.warnings.append(f'{missing} of {len(depths)} colour images have no depth image')
         return depths
 
-    def _read_stamps(self, options: ReadOptions) -> list[int]:
+    def _read_stamps(self, count: int, options: ReadOptions) -> tuple[int, ...]:
         path = self.path / 'timestamps.txt'
         if not path.exists():
-            return [round(index * 1e9 / options.fps) for index in range(len(self._colors))]
-        stamps = read_stamps(path)
-        if len(stamps) != len(self._colors):
+            return even_stamps(count, options.fps)
+        stamps = tuple(read_stamps(path))
+        if len(stamps) != count:
             raise RecordingError(
-                f'{path} has {len(stamps)} lines for {len(self)} images: write one per image'
+                f'{path} has {len(stamps)} lines for {count} images: write one per image'
             )
         back = sum(b <= a for a, b in pairwise(stamps))
         if back:
@@ -174,33 +160,8 @@ class SequenceFolder:
             )
         return boxes[: len(self)]
 
-    def _decode_color(self, path: Path) -> ColorImage:
-        try:
-            return decode_color_bytes(memoryview(read_file(path, MAX_IMAGE)), self._max_pixels)
-        except ImageError as error:
-            raise ImageError(f'{path}: {error}') from None
 
-    def _decode_depth(self, path: Path) -> DepthImage | None:
-        try:
-            return decode_depth_bytes(
-                memoryview(read_file(path, MAX_IMAGE)), max_pixels=self._max_pixels
-            )
-        except EncodingError as error:
-            raise ImageError(f'{path}: {error}') from None
-        except ImageError as error:
-            self.warnings.append(f'{path}: {error}; the frame is read without depth')
-            return None
-
-
-def _images(folder: Path) -> list[Path]:
-    try:
-        found = [p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
-    except OSError as error:
-        raise RecordingError(cannot_read(folder, error)) from None
-    return sorted(found, key=lambda p: natural_key(p.name))
-
-
-def _stream(name: str, paths: list[Path], rate: float | None, role: str) -> StreamInfo:
+def _stream(name: str, paths: Sequence[Path], rate: float | None, role: str) -> StreamInfo:
     try:
         head = inspect(memoryview(read_file(paths[0], MAX_IMAGE)), MAX_SIDE**2)
     except ImageError as error:

@@ -16,7 +16,6 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import cast
 
 import cv2
@@ -27,7 +26,7 @@ from rgbd_kcf_tracker.errors import MissingExtraError, RecordingError
 from rgbd_kcf_tracker.extras import how_to_get
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.outputs import OutputFile, check_outputs
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile, check_outputs
 from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
 from rgbd_kcf_tracker.track import Track
 
@@ -52,7 +51,7 @@ def require_video(path: str | os.PathLike[str]) -> None:
     _ffmpeg(Path(path))
 
 
-class VideoWriter:
+class VideoWriter(FrameWriter):
     """Writes pictures as mp4 (H.264, yuv420p). The first picture sets the size.
 
     ffmpeg runs in a session of its own: when this program dies, even by kill -9, its input ends and
@@ -173,21 +172,6 @@ class VideoWriter:
             pass
         finally:
             one.unlink(missing_ok=True)
-
-    def __enter__(self) -> VideoWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if error is None:
-            self.close()
-        else:
-            with contextlib.suppress(RecordingError):  # the error before says more
-                self.close(whole=False)
 
     def _start(self, width: int, height: int) -> subprocess.Popen[bytes]:
         # yuv420p wants even sides.

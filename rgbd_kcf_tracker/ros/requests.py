@@ -107,12 +107,6 @@ class Requests:
                 from rgbd_kcf_tracker.live.auto_init import AutoInit
 
                 auto = AutoInit(settings)
-                if settings.auto_init_confirm and not auto.confirms:
-                    self._fault(
-                        'unconfirmed_auto_init',
-                        'this OpenCV has no HOG people detector (4.x has): auto_init goes by '
-                        'depth alone',
-                    )
             again = settings.auto_init_again
             self._in_worker('auto_init', lambda: self._session.choose_by_itself(auto, again))
 

@@ -156,6 +156,7 @@ class TrackerNode(LifecycleNode):
                 color_transport=settings.color_transport,
                 depth_transport=settings.depth_transport,
                 places=self._transforms,
+                max_pixels=settings.max_pixels,
             )
             self._requests = Requests(
                 self._processor, lambda: self._settings, self._in_worker, self._fault

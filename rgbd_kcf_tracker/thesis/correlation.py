@@ -33,19 +33,6 @@ KERNELS = (GAUSSIAN, LINEAR)
 _TIE = 1e-9
 
 
-def gaussian_labels(shape: tuple[int, int], sigma: float) -> npt.NDArray[np.float64]:
-    """Regression targets: 1 at the zero shift ``[0, 0]``, falling off with the cyclic distance.
-
-    Args:
-        shape: rows and columns, in cells.
-        sigma: bandwidth, in cells.
-    """
-    rows = np.fft.fftfreq(shape[0], 1 / shape[0])[:, None]
-    cols = np.fft.fftfreq(shape[1], 1 / shape[1])[None, :]
-    labels: npt.NDArray[np.float64] = np.exp(-0.5 * (rows**2 + cols**2) / sigma**2)
-    return labels
-
-
 def cosine_window(shape: tuple[int, int]) -> npt.NDArray[np.float32]:
     """Separable Hann window, zero on the border, against the wrap-round of the cyclic shifts."""
     window = np.hanning(shape[0])[:, None] * np.hanning(shape[1])[None, :]
@@ -201,7 +188,8 @@ class CorrelationFilter:
     """A regression learned from patches of one size, and evaluated at all shifts of others.
 
     Args:
-        labels: ``(rows, cols)`` targets with the peak at ``[0, 0]``, see :func:`gaussian_labels`.
+        labels: ``(rows, cols)`` targets with the peak at ``[0, 0]``, see
+            :func:`~rgbd_kcf_tracker.features.labels.gaussian_labels`.
         regularization: lambda of the ridge regression.
         kernel: ``'gaussian'`` or ``'linear'``.
         kernel_sigma: bandwidth of the Gaussian kernel; not used by the linear one.

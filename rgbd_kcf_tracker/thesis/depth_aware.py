@@ -95,12 +95,16 @@ class DepthAwareTracker(ABC):
         parameters: of the depth test and the filter.
         low: response at and below which a target without depth to ask about counts as hidden.
         high: response from which the target is surely seen.
+
+    Attributes:
+        response: the filter's highest in the last frame.
     """
 
     def __init__(self, parameters: DepthParameters, low: float, high: float) -> None:
         self._depth_parameters = parameters
         self._low, self._high = low, max(high, low + 1e-6)
         self._model: KcfModel | None = None
+        self.response: float | None = None
 
     def start(self, frame: Frame, box: Box) -> Track:
         """Take the target in ``box``; see :class:`~rgbd_kcf_tracker.track.Tracker`.
@@ -128,7 +132,7 @@ class DepthAwareTracker(ABC):
             return Track(None, TrackState.IDLE)
         if (frame.width, frame.height) != self._image_size:
             self._rescale(frame, self._model)
-        interval = min(max((frame.stamp_ns - self._stamp_ns) * 1e-9, 0.0), _LONGEST_INTERVAL_S)
+        interval = frame.seconds_since(self._stamp_ns, 0.0, _LONGEST_INTERVAL_S)
         self._stamp_ns = frame.stamp_ns
         found = self._follow(frame, self._model, interval)
         if found is not None:

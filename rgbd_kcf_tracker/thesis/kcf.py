@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import Parameters, parameter
@@ -29,7 +30,6 @@ from rgbd_kcf_tracker.thesis.correlation import (
     CorrelationFilter,
     Sample,
     cosine_window,
-    gaussian_labels,
     peak,
 )
 from rgbd_kcf_tracker.thesis.window import gray_window
@@ -237,10 +237,15 @@ class KcfModel:
 
 
 class KcfTracker:
-    """Follows a target of fixed size by its look alone; it never says that the target is absent."""
+    """Follows a target of fixed size by its look alone; it never says that the target is absent.
+
+    Attributes:
+        response: the filter's highest in the last frame.
+    """
 
     def __init__(self, parameters: KcfParameters) -> None:
         self._parameters = parameters
+        self.response: float | None = None
         self._track = Track(None, TrackState.IDLE)
         self._model: KcfModel | None = None
         self._box = Box(0, 0, 1, 1)
@@ -267,6 +272,7 @@ class KcfTracker:
             self._rescale(frame)
         box = self._box
         found = self._model.detect(frame, box.cx, box.cy)
+        self.response = found.response
         self._box = Box.from_center(found.cx, found.cy, box.width, box.height)
         self._model.train(frame, found.cx, found.cy)
         reported = Box.from_center(found.fine_cx, found.fine_cy, box.width, box.height)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
 from rgbd_kcf_tracker.geometry import Box
 
 Float = npt.NDArray[np.floating[Any]]
@@ -28,30 +29,6 @@ def normal_likelihood(distance: Float, sigma: float) -> Float:
     """Density of the normal distribution at a distance: large where the distance is small."""
     density: Float = np.exp(-0.5 * (distance / sigma) ** 2) / (np.sqrt(2 * np.pi) * sigma)
     return density
-
-
-def effective_size(weights: Float) -> float:
-    """How many equally weighted particles normalised weights are worth, 1 to n."""
-    return float(1 / np.sum(weights**2))
-
-
-def systematic_resample(weights: Float, rng: np.random.Generator) -> npt.NDArray[np.intp]:
-    """Which particles survive, and how often: evenly spaced draws with one random offset.
-
-    Args:
-        weights: ``(n,)``, summing to 1.
-        rng: of the one random number.
-
-    Returns:
-        ``(n,)`` indices; particle i is drawn floor or ceil of ``n * weights[i]`` times, on average
-        exactly that.
-    """
-    count = len(weights)
-    places = (np.arange(count) + rng.random()) / count
-    edges = np.cumsum(weights)
-    # Rounding must leave no draw beyond the last edge.
-    edges[-1] = 1.0
-    return np.searchsorted(edges, places, side='right').clip(0, count - 1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,6 +88,7 @@ class RgbdTracker(DepthAwareTracker):
     def _follow(self, frame: Frame, model: KcfModel, interval: float) -> Detection | None:
         """Steps 5 to 17 of Algorithm 1; :meth:`_see` is steps 3 and 4 for the next frame."""
         best, here = self._search(frame, model)
+        self.response = best.response
         if not self._plausible(frame, best):
             best = here
         if best.response > self._parameters.detect_threshold and (

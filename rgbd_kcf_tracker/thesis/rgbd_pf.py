@@ -155,6 +155,7 @@ class RgbdPfTracker(DepthAwareTracker):
         if self._hidden:
             return self._look_for_hidden(frame, model)
         here = self._expect(frame, model)
+        self.response = here.response
         difference = self._diff_at_centre(frame, self._box_at(here), interval)
         if self._occlusion_status(difference, here.response):
             # Step 19: the position is kept, nothing is learned, and no box is drawn.
@@ -244,6 +245,7 @@ class RgbdPfTracker(DepthAwareTracker):
         self._particles.resample(self._parameters.resample_below)
         places.append((self._box.cx, self._box.cy))
         candidates = self._detect_at(frame, model, places)
+        self.response = max(each.response for each in candidates)
         for found in sorted(candidates, key=lambda each: each.response, reverse=True):
             if self._is_target(frame, found):
                 return self._found_again(frame, model, found)

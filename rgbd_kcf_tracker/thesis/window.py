@@ -1,47 +1,15 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Cutting a window out of an image, whatever part of it lies outside."""
+"""The grey window that Henriques' code looks at."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-Image = npt.NDArray[Any]
-
-
-def cut(image: Image, left: int, top: int, width: int, height: int) -> Image:
-    """The ``height`` x ``width`` window whose top-left pixel is ``left, top``.
-
-    Pixels outside the image repeat the nearest one inside. The result is a view of ``image`` where
-    the window lies inside, else a new array.
-    """
-    rows, cols = image.shape[:2]
-    if left >= 0 and top >= 0 and left + width <= cols and top + height <= rows:
-        return image[top : top + height, left : left + width]
-    # The part inside, at least one pixel of it: what a window far outside repeats.
-    x0, x1 = _inside(left, width, cols)
-    y0, y1 = _inside(top, height, rows)
-    above, before = min(max(y0 - top, 0), height - 1), min(max(x0 - left, 0), width - 1)
-    bordered: Image = cv2.copyMakeBorder(
-        image[y0:y1, x0:x1],
-        above,
-        height - above - (y1 - y0),
-        before,
-        width - before - (x1 - x0),
-        cv2.BORDER_REPLICATE,
-    )
-    return bordered
-
-
-def _inside(start: int, size: int, limit: int) -> tuple[int, int]:
-    first = min(max(start, 0), limit - 1)
-    last = min(max(start + size, first + 1), limit)
-    return first, last
+from rgbd_kcf_tracker.features.windows import bordered
 
 
 def gray_window(
@@ -75,7 +43,7 @@ def gray_window(
     )
     if not halves and source[0] * source[1] > _MOST_AT_ONCE:
         return _sampled(color, left, top, source, target)
-    cropped = cut(color, left, top, source[0] + 2 * margin, source[1] + 2 * margin)
+    cropped = bordered(color, left, top, source[0] + 2 * margin, source[1] + 2 * margin)
     gray: npt.NDArray[np.uint8] = cv2.cvtColor(np.ascontiguousarray(cropped), cv2.COLOR_BGR2GRAY)
     if halves:
         return _halved(gray)

@@ -26,6 +26,8 @@ _FIELDS: dict[str, dict[str, type]] = {
     'speed': {'value': float},
     'box': {'x': float, 'y': float, 'width': float, 'height': float, 'frame': int},
     'point': {'x': float, 'y': float, 'frame': int},
+    'follow': {'id': int, 'frame': int},
+    'everyone': {'value': bool},
     'remove': {'id': int},
     'rename': {'id': int, 'name': str},
     'variant': {'name': str},

@@ -11,6 +11,7 @@ from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe
 from rgbd_kcf_tracker.variants import VARIANTS
 from rgbd_kcf_tracker.view.board import Board
 from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.targets import follows_everyone
 
 
 class Controller(Protocol):
@@ -45,6 +46,7 @@ def describe_variants() -> list[dict[str, Any]]:
         {
             'name': variant.name,
             'summary': variant.summary,
+            'everyone': follows_everyone(variant.name),
             'parameters': [_described(info) for info in describe(variant.parameters)],
         }
         for variant in VARIANTS.values()

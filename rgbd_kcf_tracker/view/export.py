@@ -35,9 +35,10 @@ def export(
     parameters: Parameters,
     start: int,
     end: int,
-    box: Box,
+    box: Box | None,
     progress: Callable[[int], None] = lambda _: None,
     overwrite: bool = False,
+    everyone: bool = False,
 ) -> int:
     """Track a recording and write what the page shows of it into one file.
 
@@ -48,9 +49,10 @@ def export(
         parameters: of the variant.
         start: the frame of the box.
         end: the frame to stop before.
-        box: the target, pixels.
+        box: the target, pixels; None where only everyone is followed.
         progress: told of each frame.
         overwrite: replace a file that is there.
+        everyone: whether people whom nobody chose are followed too.
 
     Returns:
         The number of moments in the file.
@@ -59,7 +61,7 @@ def export(
         RecordingError: where the file cannot be written, or is there already.
         BoxError: where the box lies outside the image.
     """
-    player = Player(recording, variant, parameters, start=start, box=box)
+    player = Player(recording, variant, parameters, start=start, box=box, everyone=everyone)
     every = max(1, -(-(end - start) // MOST_MOMENTS))
     moments: list[str] = []
     entries: list[dict[str, Any]] = []

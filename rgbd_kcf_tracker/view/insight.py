@@ -29,11 +29,16 @@ from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.perceive.surfaces import cut
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
 from rgbd_kcf_tracker.targets import TargetSet
+from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker
+from rgbd_kcf_tracker.thesis.kcf import KcfTracker
 from rgbd_kcf_tracker.thesis.particle_filter import HEIGHT, WIDTH, X, Y
 from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfTracker
 from rgbd_kcf_tracker.track import Tracker
 
 Array = npt.NDArray[Any]
+
+ONE_THING = 0.8
+"""Overlap from which two silhouettes that were weighed are one thing, which was cut in two ways."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +71,9 @@ class Insight:
         view_depth: ``(h, w)`` metres of the view, 0 for no reading.
         floor: ``(a, b, c)`` with ``1/z = a u + b v + c`` in pixels of the view; None where unknown.
         step: pixels of the image to one of the view.
-        gallery: of each view by which the target is known, ``(slices, 3)`` RGB from head to feet.
+        gallery: the views by which the target is known, the first one first.
+        response: the correlation filter's highest in this frame, a cosine likeness for the thesis's
+            trackers and against its own recent mean for ``metric``; None where it was not asked.
     """
 
     considered: tuple[Considered, ...] = ()
@@ -77,7 +84,8 @@ class Insight:
     view_depth: Array | None = None
     floor: tuple[float, float, float] | None = None
     step: int = 1
-    gallery: tuple[Array, ...] = ()
+    gallery: tuple[View, ...] = ()
+    response: float | None = None
 
 
 COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
@@ -97,7 +105,10 @@ def insight_of(tracker: Tracker) -> Insight:
     if isinstance(tracker, RgbdPfTracker) and tracker._model is not None:
         states = tracker._particles.states
         middles = states[:, [X, Y]] + states[:, [WIDTH, HEIGHT]] / 2
-        return Insight(particle_pixels=middles, weights=tracker._particles.weights.copy())
+        weights = tracker._particles.weights.copy()
+        return Insight(particle_pixels=middles, weights=weights, response=tracker.response)
+    if isinstance(tracker, (KcfTracker, DepthAwareTracker)):
+        return Insight(response=tracker.response)
     return Insight()
 
 
@@ -110,31 +121,47 @@ def insight_in(targets: TargetSet, number: int) -> Insight:
 
 def of_metric(targets: MetricTargets, number: int) -> Insight:
     """What is known of one of several targets after the last frame."""
-    account, follower = targets.account, targets._followers[number]
+    account, follower = targets.account, targets._followers.get(number)
+    person = targets.person(number) if follower is None else follower.person
+    gallery = () if person is None else tuple(person.gallery.views)
+    if follower is None:
+        return Insight(gallery=gallery)
+    response = follower.response
     if account is None:
-        return Insight()
-    scene, surface, person = account.scene, follower._surface, follower.person
-    considered = []
+        return Insight(gallery=gallery, response=response)
+    scene, surface = account.scene, follower._surface
+    considered: list[Considered] = []
     for candidate, box in follower.weighed():
         share = evidence.WEIGHTS * candidate.evidence.features()
         seen = candidate.seen
         mask = np.zeros(scene.view.shape, bool)
         rows, cols = seen.mask.shape
         mask[seen.top : seen.top + rows, seen.left : seen.left + cols] = seen.mask
+        if any(_overlap(mask, other.mask) > ONE_THING for other in considered):
+            continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
         considered.append(Considered(box, float(candidate.probability), cues, mask))
     cloud = surface._cloud if surface is not None else None
+    half = surface.body.height / 2 if surface is not None else 0.0
     floor = scene.floor
     return Insight(
         considered=tuple(considered),
-        particles=None if cloud is None else cloud._positions.copy(),
+        # Where its head is, as the engine has it; shown where its middle is, as all else.
+        particles=None if cloud is None else cloud._positions + np.array((0, half, 0)),
         weights=None if cloud is None else cloud._weights.copy(),
         surfaces=scene.surfaces.labels,
         view_depth=scene.view.depth,
         floor=None if floor is None else (floor.a, floor.b, floor.c),
         step=scene.view.step,
-        gallery=() if person is None else tuple(map(colors_of, person.gallery.views)),
+        gallery=gallery,
+        response=response,
     )
+
+
+def _overlap(one: Array, other: Array | None) -> float:
+    """Common pixels of two masks against those of either."""
+    either = np.count_nonzero(one | other)
+    return np.count_nonzero(one & other) / either if either else 0.0
 
 
 def colors_of(view: View) -> Array:

@@ -28,6 +28,8 @@ from rgbd_kcf_tracker.view.showing import Detail, Seen, show
 
 TARGET = 1
 """The node follows one target; this is its id in the page."""
+STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
+"""What an answer takes its time for, as the node's diagnostics tell, each a median."""
 _ANSWERS = 64
 _MOST_ROWS = 200_000
 _MOST_COMMANDS = 64
@@ -81,6 +83,7 @@ class LivePage:
         self._hidden = False
         self._position: tuple[int, tuple[float, float, float]] | None = None
         self._figures: dict[str, str] = {}
+        self._lately = 0
         self._word = ''
         self._said = 0.0
         self._shown_at = 0.0
@@ -103,6 +106,7 @@ class LivePage:
             'frames': 0,
             'variants': describe_variants(),
             'several': False,
+            'stages': STAGES,
         }
 
     def boxes_csv(self) -> str:
@@ -141,6 +145,8 @@ class LivePage:
 
     def figures(self, values: Mapping[str, str]) -> None:
         """What ``/diagnostics`` says of the node."""
+        before = _number(self._figures.get('dropped', values.get('dropped')))
+        self._lately += max(0, int(_number(values.get('dropped')) - before))
         self._figures = dict(values)
 
     def answer(self, stamp_ns: int, box: Box | None) -> None:
@@ -162,13 +168,16 @@ class LivePage:
         self._count += 1
         if state is not TrackState.IDLE:
             self._rows.append((self._count - 1, stamp_ns, track))
-        self.board.note(
-            {
-                't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
-                'targets': [] if state is TrackState.IDLE else [(TARGET, state.value, None, 0)],
-                'track': _number(self._figures.get('work_median_ms')),
-            }
-        )
+        entry = {
+            't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
+            'targets': []
+            if state is TrackState.IDLE
+            else [(TARGET, state.value, None, 0, None, None, place)],
+            **{stage: _number(self._figures.get(f'{stage}_median_ms')) for stage in STAGES},
+        }
+        if self._lately:
+            entry['dropped'], self._lately = self._lately, 0
+        self.board.note(entry)
 
     def due(self) -> bool:
         """Whether somebody looks and the next moment may be put up."""

@@ -10,6 +10,7 @@ said there. A new target, or another parameter, has the run go on from the frame
 from __future__ import annotations
 
 import io
+import itertools
 import queue
 import threading
 import time
@@ -17,10 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
@@ -33,19 +31,20 @@ from rgbd_kcf_tracker.view.board import HISTORY_S, Board
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.insight import Insight
-from rgbd_kcf_tracker.view.showing import GALLERY_HEIGHT, Detail, Seen, confusion, show
-from rgbd_kcf_tracker.view.targets import Targets
+from rgbd_kcf_tracker.view.known import Known, known_by
+from rgbd_kcf_tracker.view.showing import Detail, Seen, rival, show
+from rgbd_kcf_tracker.view.targets import SAME, Targets, follows_everyone
 
 SPEEDS = (0.1, 8.0)
 SHOWN_HZ = 20.0
 """Moments put up each second at most; every frame is tracked all the same."""
-GALLERY = 8
-GALLERY_S = 0.5
-"""Views that are kept of each target, and the least time between two of them."""
+STAGES = ('read', 'track', 'show')
+"""What a moment takes its time for."""
+WARM_UP = 30
+"""Frames before the one shown from which a run that follows everyone goes on: who stands before a
+room is known when the room is."""
 _MOST_COMMANDS = 64
 _IDLE_S = 0.2
-
-Picture = npt.NDArray[np.uint8]
 
 
 @dataclass
@@ -55,11 +54,13 @@ class Passed:
     Attributes:
         stamp_ns: of the frame.
         tracks: by id.
+        chosen: ids of those who were asked for.
         entry: its figures for the time line.
     """
 
     stamp_ns: int
     tracks: dict[int, Track]
+    chosen: frozenset[int] = frozenset()
     entry: dict[str, Any] = field(default_factory=dict)
 
 
@@ -72,7 +73,12 @@ class Player:
         parameters: of the variant; None for the released defaults.
         start: the frame shown first.
         box: the target in it; None to have it picked in the page.
+        everyone: whether people whom nobody chose are followed too.
         detail: of what is sent.
+
+    Raises:
+        RecordingError: where there is no such frame.
+        ParameterError: where everyone is to be followed and the variant cannot.
     """
 
     def __init__(
@@ -83,6 +89,7 @@ class Player:
         *,
         start: int = 0,
         box: Box | None = None,
+        everyone: bool = False,
         detail: Detail | None = None,
     ) -> None:
         if not 0 <= start < len(recording):
@@ -98,15 +105,15 @@ class Player:
         self._thread: threading.Thread | None = None
 
         self._passed: dict[int, Passed] = {}
-        self._targets = Targets(variant, self._parameters)
+        self._everyone = everyone
+        self._numbers = itertools.count(1)
+        self._targets = Targets(variant, self._parameters, everyone, self._numbers)
         self._names: dict[int, str] = {}
-        self._next_id = 1
         self._front = start - 1  # the last frame that the trackers have seen
         self._shown = start
         self._frame: Frame | None = None
         self._insights: dict[int, Insight] = {}
-        self._views: dict[int, list[Picture]] = {}
-        self._viewed: dict[int, int] = {}
+        self._known: dict[int, tuple[Known, ...]] = {}
         self._reader: Iterator[Frame] | None = None
         self._next = start
         self._origin_ns = 0
@@ -135,6 +142,7 @@ class Player:
             'frames': len(self._recording),
             'variants': describe_variants(),
             'several': True,
+            'stages': STAGES,
         }
 
     def boxes_csv(self) -> str:
@@ -231,10 +239,14 @@ class Player:
             self._pick(values['frame'], lambda _: Box(*(values[n] for n in _BOX)))
         elif command.do == 'point':
             self._pick(values['frame'], lambda frame: surface_at(frame, values['x'], values['y']))
+        elif command.do == 'follow':
+            self._pick(values['frame'], lambda _: self._box_of(values['id']))
+        elif command.do == 'everyone':
+            self._follow_everyone(values['value'])
         elif command.do == 'remove':
             self._remove(values['id'])
         elif command.do == 'rename':
-            if values['id'] in self._targets and values['name']:
+            if values['name']:
                 self._names[values['id']] = values['name']
         elif command.do == 'variant':
             if values['name'] not in VARIANTS:
@@ -267,7 +279,7 @@ class Player:
         """Show a frame; those between it and the last one tracked are tracked first."""
         wanted = min(max(wanted, 0), len(self._recording) - 1)
         anew = wanted != self._shown + 1
-        if len(self._targets) and wanted > self._front:
+        if (len(self._targets) or self._everyone) and wanted > self._front:
             begun = time.monotonic()
             for number in range(self._front + 1, wanted + 1):
                 self._track(number, self._read(number))
@@ -315,10 +327,10 @@ class Player:
         tracks = self._targets.update(frame)
         self._timing['track'] = 1000 * (time.perf_counter() - begun)
         self._insights = dict(self._targets.insights())
-        self._passed[number] = Passed(frame.stamp_ns, tracks)
+        self._passed[number] = Passed(frame.stamp_ns, tracks, self._targets.chosen)
         self._front = number
         self._entry(number)
-        self._keep_views(frame, tracks)
+        self._remember(frame, tracks)
 
     def _entry(self, number: int) -> None:
         """The figures of a frame for the time line."""
@@ -327,18 +339,29 @@ class Player:
             't': round((passed.stamp_ns - self._origin_ns) * 1e-9, 4),
             'frame': number,
             'targets': [
-                (
-                    key,
-                    track.state.value,
-                    round(float(track.score), 3) if track.score == track.score else 0.0,
-                    round(confusion(track, self._insights.get(key)), 3),
-                )
-                for key, track in passed.tracks.items()
+                self._figures(key, track, passed.tracks) for key, track in passed.tracks.items()
             ],
-            'read': round(self._timing.get('read', 0.0), 2),
-            'track': round(self._timing.get('track', 0.0), 2),
-            'show': round(self._timing.get('show', 0.0), 2),
+            **{stage: round(self._timing.get(stage, 0.0), 2) for stage in STAGES},
         }
+
+    def _figures(self, key: int, track: Track, tracks: dict[int, Track]) -> tuple[Any, ...]:
+        """Of one target: id, state, score, confusion and with whom, response, position."""
+        insight = self._insights.get(key)
+        other = rival(track, insight)
+        who = None
+        if other is not None:
+            boxes = ((k, t.box) for k, t in tracks.items() if k != key and t.box is not None)
+            who = next((k for k, box in boxes if box.iou(other.box) > SAME), None)
+        response = None if insight is None else insight.response
+        return (
+            key,
+            track.state.value,
+            round(float(track.score), 3),
+            0.0 if other is None else round(other.probability, 3),
+            who,
+            None if response is None else round(response, 3),
+            None if track.position is None else [round(v, 2) for v in track.position],
+        )
 
     def _history(self) -> list[dict[str, Any]]:
         """The figures of the last minute before the frame that is shown."""
@@ -352,19 +375,29 @@ class Player:
         ]
         return [entry for entry in recent if entry]
 
-    def _keep_views(self, frame: Frame, tracks: dict[int, Track]) -> None:
-        """Keep a picture of each target now and then, the surest ones."""
-        for number, track in tracks.items():
-            views = self._views.setdefault(number, [])
-            late = frame.stamp_ns - self._viewed.get(number, 0) >= GALLERY_S * 1e9
-            if track.box is None or track.score < 0.5 or not late:
-                continue
-            view = _view(frame, track.box)
-            if view is not None:
-                self._viewed[number] = frame.stamp_ns
-                # The first stays; of the others the newest.
-                views[1:] = views[-(GALLERY - 2) :] if len(views) >= GALLERY else views[1:]
-                views.append(view)
+    def _remember(self, frame: Frame, tracks: dict[int, Track]) -> None:
+        """Keep a picture of each view that a target is known by from this frame on."""
+        for number, insight in self._insights.items():
+            track = tracks.get(number)
+            box = None if track is None else track.box
+            before = self._known.get(number, ())
+            self._known[number] = known_by(insight.gallery, before, frame, box)
+
+    def _box_of(self, key: int) -> Box:
+        passed = self._passed.get(self._shown)
+        track = None if passed is None else passed.tracks.get(key)
+        if track is None or track.box is None:
+            raise BoxError(f'{self._name(key)} is not in sight here: go to a frame where it is')
+        return track.box
+
+    def _name(self, key: int) -> str:
+        return self._names.get(key, f'person {key}')
+
+    def _follow_everyone(self, value: bool) -> None:
+        """Follow people whom nobody chose too, or no more, from the frame that is shown."""
+        self._targets.everyone = value
+        self._everyone = value
+        self._again(self._shown)
 
     # -- targets and parameters -------------------------------------------------------------------
 
@@ -379,17 +412,16 @@ class Player:
         assert self._frame is not None
         if self._shown < self._front:
             self._again(self._shown)
-        key = self._next_id
-        track = self._targets.add(key, self._frame, box)
-        self._next_id += 1
-        self._names[key] = f'target {key}'
+        key, track = self._targets.add(self._frame, box)
+        self._names.setdefault(key, f'target {key}')
         self._forget_after(self._shown)
         passed = self._passed.setdefault(self._shown, Passed(self._frame.stamp_ns, {}))
         passed.tracks[key] = track
+        passed.chosen = self._targets.chosen
         self._front = self._shown
+        self._insights = dict(self._targets.insights())
         self._entry(self._shown)
-        self._viewed[key] = 0
-        self._keep_views(self._frame, {key: track})
+        self._remember(self._frame, passed.tracks)
         self.board.rewind(self._history())
 
     def _remove(self, key: int) -> None:
@@ -398,11 +430,15 @@ class Player:
         if self._shown < self._front:
             self._again(self._shown)
         self._targets.remove(key)
-        self._insights.pop(key, None)
-        self._views.pop(key, None)
         self._forget_after(self._shown)
+        if not self._everyone:
+            self._insights.pop(key, None)
+            self._known.pop(key, None)
         if self._shown in self._passed:
-            self._passed[self._shown].tracks.pop(key, None)
+            passed = self._passed[self._shown]
+            passed.chosen = self._targets.chosen
+            if not self._everyone:
+                passed.tracks.pop(key, None)
             self._entry(self._shown)
         self.board.rewind(self._history())
 
@@ -419,11 +455,12 @@ class Player:
     def _reconfigure(self, variant: str, parameters: Parameters) -> None:
         """Go on from the frame that is shown with another tracker, or others of its parameters."""
         self._variant, self._parameters = variant, parameters
+        self._everyone = self._everyone and follows_everyone(variant)
         self._again(self._shown)
 
     def _again(self, number: int) -> None:
         """Trackers that stand at a frame: each starts where its target was last seen up to it."""
-        keys = list(self._passed[number].tracks) if number in self._passed else []
+        keys = self._passed[number].chosen if number in self._passed else ()
         starts: dict[int, int] = {}
         for key in keys:
             for earlier in range(number, -1, -1):
@@ -433,17 +470,28 @@ class Player:
                 if passed.tracks[key].box is not None:
                     starts[key] = earlier
                     break
-        self._targets = Targets(self._variant, self._parameters)
+        self._targets = Targets(self._variant, self._parameters, self._everyone, self._numbers)
         self._forget_after(number)
-        if starts:
-            for at in range(min(starts.values()), number + 1):
-                frame = self._read(at)
-                tracks = self._targets.update(frame)
-                for key, begin in starts.items():
-                    box = self._passed[at].tracks[key].box if begin == at else None
-                    if box is not None:
-                        tracks[key] = self._targets.add(key, frame, box)
+        self._known.clear()
+        begin = min(starts.values(), default=number)
+        if self._everyone:
+            begin = max(0, min(begin, number - WARM_UP))
+        tracks: dict[int, Track] = {}
+        for at in range(begin, number + 1) if starts or self._everyone else ():
+            frame = self._read(at)
+            tracks = self._targets.update(frame)
+            for key, first in starts.items():
+                box = self._passed[at].tracks[key].box if first == at else None
+                if box is not None:
+                    tracks[key] = self._targets.add(frame, box, key)[1]
+            if at in self._passed:
+                tracks = self._targets.resume(tracks, self._passed[at].tracks)
                 self._passed[at].tracks.update(tracks)
+            self._insights = dict(self._targets.insights())
+            self._remember(frame, tracks)
+        if number in self._passed:
+            passed = self._passed[number]
+            passed.tracks, passed.chosen = tracks, self._targets.chosen
         self._insights = dict(self._targets.insights())
         self._front = number
         if number in self._passed:
@@ -470,11 +518,13 @@ class Player:
         return Seen(
             self._frame,
             passed.tracks if passed is not None else {},
-            self._names,
+            {key: self._name(key) for key in (passed.tracks if passed is not None else ())},
+            passed.chosen if passed is not None else frozenset(),
             current,
-            self._views,
+            self._known,
             truth[self._shown] if truth is not None and known else None,
             {
+                'everyone': self._everyone,
                 'frame': self._shown,
                 'stamp_ns': str(self._frame.stamp_ns),
                 'time': round((self._frame.stamp_ns - self._origin_ns) * 1e-9, 3),
@@ -493,17 +543,3 @@ class Player:
 
 
 _BOX = ('x', 'y', 'width', 'height')
-
-
-def _view(frame: Frame, box: Box) -> Picture | None:
-    import cv2
-
-    inside = box.clipped(frame.width, frame.height)
-    if inside is None or inside.width < 2 or inside.height < 2:
-        return None
-    left, top = int(inside.x), int(inside.y)
-    part = frame.color[top : int(inside.bottom), left : int(inside.right)]
-    width = max(1, round(part.shape[1] * GALLERY_HEIGHT / part.shape[0]))
-    size = (min(width, 2 * GALLERY_HEIGHT), GALLERY_HEIGHT)
-    view: Picture = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
-    return view

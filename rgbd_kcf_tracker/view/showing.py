@@ -21,7 +21,8 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.track import Track, TrackState
-from rgbd_kcf_tracker.view.insight import Insight
+from rgbd_kcf_tracker.view.insight import Considered, Insight
+from rgbd_kcf_tracker.view.known import Known
 
 QUALITY = 80
 MOST_PARTICLES = 300
@@ -32,7 +33,8 @@ _NO_DEPTH = (224, 219, 216)
 # Of two independent normal variables, 95 % lie within sqrt(-2 ln 0.05) deviations.
 _HOLDS_95 = 2.4477
 _STRANGER_AT = 0.02
-GALLERY_HEIGHT = 96
+MOST_VIEWS, MOST_OF_OTHERS = 8, 1
+"""Views shown of those who are followed, the first and the newest, and of the others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +60,9 @@ class Seen:
         frame: the images.
         tracks: answers by id.
         names: of the targets.
+        chosen: ids of those who were asked for; None for all.
         insights: what each tracker knows.
-        views: pictures by which each target is known, BGR, oldest first.
+        known: what each is known by, oldest first.
         truth: the true box where known.
         status: what else the page shows: numbers, words.
     """
@@ -67,8 +70,9 @@ class Seen:
     frame: Frame
     tracks: Mapping[int, Track] = field(default_factory=dict)
     names: Mapping[int, str] = field(default_factory=dict)
+    chosen: frozenset[int] | None = None
     insights: Mapping[int, Insight] = field(default_factory=dict)
-    views: Mapping[int, list[npt.NDArray[np.uint8]]] = field(default_factory=dict)
+    known: Mapping[int, tuple[Known, ...]] = field(default_factory=dict)
     truth: Box | None = None
     status: Mapping[str, Any] = field(default_factory=dict)
 
@@ -98,31 +102,37 @@ def show(seen: Seen, detail: Detail | None = None) -> tuple[dict[str, Any], dict
         'size': (frame.width, frame.height),
         'camera': (k.fx, k.fy, k.cx, k.cy),
         'guessed': frame.intrinsics is None,
-        'targets': [
-            _target(number, track, seen.names.get(number, ''), seen.insights.get(number))
-            for number, track in seen.tracks.items()
-        ],
+        'targets': [_target(number, track, seen) for number, track in seen.tracks.items()],
         'truth': _corners(seen.truth),
         **seen.status,
     }
-    insight = next(iter(seen.insights.values()), Insight())
-    header['floor'] = _floor(insight, k)
+    floors = (_floor(insight, k) for insight in seen.insights.values())
+    header['floor'] = next((floor for floor in floors if floor is not None), None)
     blobs = {'color': _jpeg(frame.color, detail)}
     if frame.depth is not None:
         picture, far = depth_picture(frame.depth, detail.width)
         blobs['depth'] = _encoded(picture, detail.quality)
         header['far'] = far
         blobs['points'] = room_points(frame, k, detail.points)
-    for number, pictures in seen.views.items():
-        for index, picture in enumerate(pictures):
-            blobs[f'view_{number}_{index}'] = _encoded(picture, detail.quality)
+    for number in seen.tracks:
+        for index, known in enumerate(_shown_of(number, seen)):
+            if known.picture:
+                blobs[f'view_{number}_{index}'] = known.picture
     return header, blobs
 
 
-def _target(number: int, track: Track, name: str, insight: Insight | None) -> dict[str, Any]:
+def _shown_of(number: int, seen: Seen) -> tuple[Known, ...]:
+    known = seen.known.get(number, ())
+    most = MOST_VIEWS if seen.chosen is None or number in seen.chosen else MOST_OF_OTHERS
+    return known if len(known) <= most else known[:1] + known[len(known) - most + 1 :]
+
+
+def _target(number: int, track: Track, seen: Seen) -> dict[str, Any]:
+    insight = seen.insights.get(number)
     target: dict[str, Any] = {
         'id': number,
-        'name': name or f'target {number}',
+        'name': seen.names.get(number) or f'target {number}',
+        'chosen': seen.chosen is None or number in seen.chosen,
         'state': track.state.value,
         'score': round(float(track.score), 4) if track.score == track.score else None,
         'box': _corners(track.box),
@@ -131,12 +141,15 @@ def _target(number: int, track: Track, name: str, insight: Insight | None) -> di
     }
     if track.velocity is not None:
         target['speed'] = round(float(np.linalg.norm(track.velocity)), 2)
+    colors = [known.colors for known in _shown_of(number, seen)]
+    if any(colors):
+        target['colors'] = colors
     if track.predicted is not None:
         target['predicted'] = [round(v, 3) for v in track.predicted]
         if track.covariance is not None:
-            x, _, z = track.predicted
+            x, y, z = track.predicted
             spread = np.array(track.covariance).reshape(3, 3)[::2, ::2]
-            target['ellipse'] = ellipse_of(np.array((x, z)), spread)
+            target['ellipse'] = [*ellipse_of(np.array((x, z)), spread), round(y, 3)]
     if insight is None:
         return target
     target['considered'] = [
@@ -150,22 +163,21 @@ def _target(number: int, track: Track, name: str, insight: Insight | None) -> di
     hidden = track.state is not TrackState.TRACKING
     if insight.particles is not None and insight.weights is not None and hidden:
         target['particles'] = _particles(insight.particles, insight.weights)
-        target.setdefault('ellipse', ellipse(insight.particles, insight.weights))
+        middle = round(float(insight.weights @ insight.particles[:, 1]), 3)
+        target.setdefault('ellipse', [*ellipse(insight.particles, insight.weights), middle])
     if insight.particle_pixels is not None and insight.weights is not None:
         target['pixels'] = _particles(insight.particle_pixels, insight.weights, 1)
     return target
 
 
-def confusion(track: Track, insight: Insight | None) -> float:
-    """The probability of the likeliest candidate that was not taken, 0 where there is none."""
+def rival(track: Track, insight: Insight | None) -> Considered | None:
+    """The likeliest candidate that was not taken: what the target may be confused with."""
     if insight is None:
-        return 0.0
+        return None
     others = [
-        c.probability
-        for c in insight.considered
-        if track.box is None or c.box.iou(track.box) < _STRANGER_AT
+        c for c in insight.considered if track.box is None or c.box.iou(track.box) < _STRANGER_AT
     ]
-    return max(others, default=0.0)
+    return max(others, key=lambda c: c.probability, default=None)
 
 
 def _corners(box: Box | None) -> list[float] | None:

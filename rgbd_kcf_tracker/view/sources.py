@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 
 from rgbd_kcf_tracker.errors import BoxError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings import Recording, RecordingInfo
+from rgbd_kcf_tracker.recordings.recording import Closing
 from rgbd_kcf_tracker.simulation import SimulatedSequence, simulate
 
 
-class SimulatedRecording:
+class SimulatedRecording(Closing):
     """A simulated scene as a :class:`~rgbd_kcf_tracker.recordings.Recording`.
 
     Args:
@@ -72,17 +72,6 @@ class SimulatedRecording:
 
     def close(self) -> None:
         """Nothing is open."""
-
-    def __enter__(self) -> Recording:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def first_box(recording: Recording, given: Box | None, start: int = 0) -> tuple[int, Box]:

@@ -32,8 +32,9 @@ from rgbd_kcf_tracker.evaluation.datasets.folder import (
     read_fractions,
     read_frames,
 )
-from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, image_files
+from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, with_truth
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.imagefiles import image_files
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 
@@ -91,7 +92,7 @@ def load(path: Path, fps: float) -> Opened:
 
     def samples() -> Iterator[Sample]:
         nobody = [None] * len(images)
-        for number, sample in enumerate(frames.samples(nobody)):
+        for number, sample in enumerate(with_truth(frames, nobody)):
             present = tuple(people.get(number, ()))
             yield dataclasses.replace(sample, people=present, number=number)
 

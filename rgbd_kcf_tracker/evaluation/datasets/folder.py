@@ -26,12 +26,16 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     is_clear,
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import (
-    ImageFrames,
     check_lengths,
+    with_truth,
+)
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.imagefiles import (
+    ImageFrames,
+    depths_beside,
     even_stamps,
     image_files,
 )
-from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.mot import REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import (
     CAMERA_INFO,
@@ -143,7 +147,7 @@ def load_id(path: Path, who: int, fps: float) -> Opened:
     frames = read_frames(path, images, fps)
 
     def samples() -> Iterator[Sample]:
-        for number, sample in enumerate(frames.samples(boxes, None, None, start, end), start):
+        for number, sample in enumerate(with_truth(frames, boxes, None, None, start, end), start):
             yield dataclasses.replace(sample, judged=judged[number])
 
     return Opened(samples(), length=end - start, start=start, total=len(images))
@@ -184,7 +188,7 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
     end = min(len(images), seen[-1] + TAIL_FRAMES + 1) if person else len(images)
     frames = read_frames(path, images, fps)
     return Opened(
-        frames.samples(boxes, body, fractions, start, end),
+        with_truth(frames, boxes, body, fractions, start, end),
         length=end - start,
         start=start,
         total=len(images),
@@ -223,8 +227,7 @@ def read_frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames
     """
     depths: tuple[Path | None, ...] = ()
     if (path / 'depth').is_dir():
-        by_stem = {p.stem: p for p in image_files(path / 'depth')}
-        depths = tuple(by_stem.get(p.stem) for p in images)
+        depths = depths_beside(images, path / 'depth')
         lost = next((p for p, d in zip(images, depths, strict=True) if d is None), None)
         if lost is not None:
             raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')

@@ -16,12 +16,11 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import (
-    ImageFrames,
     check_lengths,
-    even_stamps,
-    image_files,
     shifted,
+    with_truth,
 )
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, even_stamps, image_files
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 
 ORIGIN = 1
@@ -87,4 +86,4 @@ def load(path: Path, truth_path: Path, fps: float) -> Opened:
     if not boxes or boxes[0] is None:
         raise DatasetError(f'{truth_path}, line 1: no box to start from')
     frames = ImageFrames(images, (), even_stamps(len(images), fps))
-    return Opened(frames.samples(boxes), len(images))
+    return Opened(with_truth(frames, boxes), len(images))

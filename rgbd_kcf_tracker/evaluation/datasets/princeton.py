@@ -21,9 +21,10 @@ import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
-from rgbd_kcf_tracker.evaluation.datasets.images import ImageFrames, check_lengths
+from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, princeton_depth, with_truth
 from rgbd_kcf_tracker.evaluation.metrics.princeton import CATEGORIES
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes, read_lines
 
 MAT_FILES = ('framesNEW.mat', 'frames.mat')
@@ -105,7 +106,7 @@ def load(path: Path) -> Opened:
         )
     if not any(box is not None for box in boxes):
         raise DatasetError(f'{truth_path if annotated else init_path}: no line holds a box')
-    return Opened(frames.samples(boxes), count, annotated=annotated)
+    return Opened(with_truth(frames, boxes), count, annotated=annotated)
 
 
 def _mat(path: Path) -> Path:
@@ -150,4 +151,5 @@ def _frames(path: Path) -> tuple[ImageFrames, Path]:
     except (ParameterError, IndexError):
         intrinsics = None
     stamps = tuple(stamp * 1000 for stamp in pick['imageTimestamp'])
-    return ImageFrames(colors, depths, stamps, intrinsics, rotated_depth=True), path / 'rgb'
+    frames = ImageFrames(colors, depths, stamps, intrinsics, read_depth=princeton_depth)
+    return frames, path / 'rgb'

@@ -20,12 +20,11 @@ import numpy as np
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import (
-    ImageFrames,
     check_lengths,
-    even_stamps,
-    image_files,
+    with_truth,
 )
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, even_stamps, image_files
 from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
 
 
@@ -83,7 +82,7 @@ def load(path: Path, fps: float) -> Opened:
             f'{path / "sequence"}: fps is {settings["fps"]!r}: give a number'
         ) from None
     frames = ImageFrames(color_files, depth_files, even_stamps(len(color_files), rate))
-    return Opened(frames.samples(boxes), len(boxes))
+    return Opened(with_truth(frames, boxes), len(boxes))
 
 
 def read_regions(path: Path) -> list[Box | None]:

@@ -24,13 +24,16 @@ FloatArray = npt.NDArray[np.float64]
 
 NEW = 0.0
 """Log-odds of being somebody known from which a figure is not somebody new."""
-RETURN, RETURN_AFTER = 1.5, 1.5
-"""Log-odds against somebody who has been away for as many seconds coming back just now rather than
-somebody new."""
+RETURN, GONE = 1.5, 4.0
+"""Log-odds against somebody who is away coming back just now rather than somebody new, and the
+seconds after which two thirds of that hold: who was missed for a moment is not away."""
 SURE = 1.0
 """Log-odds by which an identity must be ahead of all others to be learned from."""
 WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
+HEADED = 1.45
+"""Metres above the floor of a figure's upper end from which its head shows, even where the image
+or something nearer begins there."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new."""
 SMALL = 0.1
@@ -54,6 +57,9 @@ SAME = 0.8
 """Share of a figure's area from which a silhouette that is part of it looks as it does."""
 MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure."""
+SAME_AGAIN = 0.5
+"""Log-odds beyond :data:`RETURN`, and ahead of anybody else, at which a newcomer is somebody who was
+here before."""
 REUNION = 1.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place."""
 RECENT = 0.6
@@ -307,10 +313,14 @@ class Crowd:
         return account
 
     def _compare(self, account: Account, row: int, column: int) -> None:
-        """Compare a sight of one person with those who were chosen and are away."""
+        """Compare a sight of one person with those who have been away since he came."""
+        newcomer = account.people[row]
         for other, person in enumerate(account.people[: len(account.looks)]):
-            if person.chosen and other != row and account.time - person.seen_at > REUNION:
-                account.people[row].resembled(person.number, float(account.looks[other, column]))
+            if other == row or person.number in newcomer.met:
+                continue
+            gone = person.seen_at < newcomer.first_seen
+            if account.time - person.seen_at > REUNION if person.chosen else gone:
+                newcomer.resembled(person.number, float(account.looks[other, column]))
 
     def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
         odds = np.zeros((len(self.people), len(sights)))
@@ -330,8 +340,8 @@ class Crowd:
                 looks[row, column] = person.gallery.log_odds(sight.view, alike)
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
-            if not person.chosen and time - person.seen_at > RETURN_AFTER:
-                odds[row] -= RETURN
+            if not person.chosen:
+                odds[row] -= RETURN * (1 - float(np.exp((person.seen_at - time) / GONE)))
         odds += looks
         return odds, looks
 
@@ -374,6 +384,33 @@ class Crowd:
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
         self._introduce(account, targets)
+        self._reunite(account, targets)
+
+    def _reunite(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+        """Give newcomers the number of whom they have turned out to be.
+
+        A first sight alone seldom tells; what several say together does.
+        """
+        for column, row in enumerate(account.owner):
+            if row < 0 or account.people[row].chosen or account.people[row].number in targets:
+                continue
+            newcomer = account.people[row]
+            alike = [
+                (newcomer.resembles(person.number), index)
+                for index, person in enumerate(account.people)
+                if not person.chosen
+                and person.number not in newcomer.met
+                and person.seen_at < newcomer.first_seen
+            ]
+            alike.sort(reverse=True)
+            if not alike or alike[0][0] < RETURN + SAME_AGAIN:
+                continue
+            if len(alike) > 1 and alike[1][0] > alike[0][0] - SAME_AGAIN:
+                continue
+            account.people[alike[0][1]].become(newcomer)
+            account.owner[column] = alike[0][1]
+            if newcomer in self.people:
+                self.people.remove(newcomer)
 
     def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
         """Remember who was seen beside whom: they are surely not the same."""
@@ -426,6 +463,7 @@ class Crowd:
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted
-        whole = seen.area > WHOLE and not seen.cut.top and alone
+        headed = not seen.cut.top or (account.scene.highest(seen) or 0.0) > HEADED
+        whole = seen.area > WHOLE and headed and alone
         if whole or not person.gallery.views:
             person.gallery.learn(view)

@@ -110,6 +110,19 @@ CUES = (
 )
 """What the regression's inputs are about, by their places in it."""
 
+CUE_WORDS = {
+    'place': 'how far it is from where the target was expected',
+    'look': 'how alike its colours are to those that the target is known by',
+    'who stands there': 'how likely the person of whom it is part is the target, by place and look',
+    'somebody else': 'how likely that person is somebody else who was seen beside the target',
+    'size': 'how well its height and visible part fit the body of the target',
+    'time hidden': 'how long the target has been away: what comes back is less surely it',
+    'should be in sight': 'nothing covers the place where the target was expected',
+    'left the image': 'the target left at the edge of the image, but this did not come in there',
+    'to begin with': 'where all other cues say nothing',
+}
+"""What each of :data:`CUES` says."""
+
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""

@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
-from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures, resampled
+from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 
 Image = npt.NDArray[np.uint8]
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
 
@@ -86,8 +87,11 @@ class HiddenCloud:
             self._weights[:] = 1.0 / len(self._weights)
             return
         self._weights /= total
-        if 1.0 / np.square(self._weights).sum() < 0.5 * len(self._weights):
-            self._resample()
+        count = len(self._weights)
+        if effective_size(self._weights) < 0.5 * count:
+            kept = systematic_resample(self._weights, self._rng)
+            self._positions, self._velocities = self._positions[kept], self._velocities[kept]
+            self._weights = np.full(count, 1.0 / count)
 
     def _seen_empty(self, view: DepthView, middle: float) -> npt.NDArray[np.bool_]:
         """Particles past which the camera sees."""
@@ -100,15 +104,6 @@ class HiddenCloud:
         seen = view.depth[np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)]
         empty: npt.NDArray[np.bool_] = inside & (seen > z + EMPTY_MARGIN)
         return empty
-
-    def _resample(self) -> None:
-        """Systematic resampling."""
-        count = len(self._weights)
-        place = (self._rng.random() + np.arange(count)) / count
-        index = np.minimum(np.searchsorted(np.cumsum(self._weights), place), count - 1)
-        self._positions = self._positions[index]
-        self._velocities = self._velocities[index]
-        self._weights = np.full(count, 1.0 / count)
 
     @property
     def mean(self) -> FloatArray:

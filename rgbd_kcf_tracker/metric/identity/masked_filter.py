@@ -16,6 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from rgbd_kcf_tracker.features.labels import gaussian_labels
+
 Features = npt.NDArray[np.float32]
 Spectrum = npt.NDArray[np.complex64]
 
@@ -23,14 +25,6 @@ PENALTY = 5.0
 PENALTY_GROWTH = 3.0
 PENALTY_MAX = 20.0
 SPARSITY = 0.01
-
-
-def gaussian_label(size: int, sigma: float) -> npt.NDArray[np.float32]:
-    """The wanted response ``(size, size)``: a Gaussian about element 0, 0, cyclic."""
-    d = np.minimum(np.arange(size), size - np.arange(size)).astype(np.float32)
-    line = np.exp(-0.5 * (d / sigma) ** 2)
-    label: npt.NDArray[np.float32] = np.outer(line, line).astype(np.float32)
-    return label
 
 
 class MaskedFilter:
@@ -44,7 +38,8 @@ class MaskedFilter:
 
     def __init__(self, size: int, sigma: float, iterations: int) -> None:
         self.size = size
-        self._label = np.conj(fft.rfft2(gaussian_label(size, sigma))).astype(np.complex64)
+        labels = gaussian_labels((size, size), sigma, np.float32)
+        self._label = np.conj(fft.rfft2(labels)).astype(np.complex64)
         self._iterations = iterations
         self._filter: Spectrum | None = None
         self._weights: npt.NDArray[np.float32] | None = None

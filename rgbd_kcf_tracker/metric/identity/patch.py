@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""A square window of the image at a fixed size, and what a correlation filter reads in it."""
+"""What a correlation filter reads in a square window of the image."""
 
 from __future__ import annotations
 
@@ -17,46 +17,6 @@ Features = npt.NDArray[np.float32]
 COLOR_WEIGHT = 0.4
 CHROMA_SLOPE = 0.05
 COLOR_CHANNELS = 5
-
-
-def resampled(color: Image, cx: float, cy: float, side: float, size: int) -> Image:
-    """The square of ``side`` pixels about ``cx, cy``, resampled to ``(size, size, channels)``.
-
-    Pixels outside the image repeat the nearest inside. Where the window is shrunk the image is
-    averaged, so that a far larger window neither aliases nor costs more than reading it once.
-    """
-    scale = size / side
-    if scale < 0.67:
-        # Average down by a whole factor first: warping alone would skip pixels.
-        factor = int(1 / scale)
-        color, left, top = _inside(color, cx, cy, side)
-        height, width = max(1, color.shape[0] // factor), max(1, color.shape[1] // factor)
-        rx, ry = width / color.shape[1], height / color.shape[0]
-        color = cv2.resize(color, (width, height), interpolation=cv2.INTER_AREA)
-        cx, cy = (cx - left) * rx, (cy - top) * ry
-        sx, sy = scale / rx, scale / ry
-    else:
-        sx = sy = scale
-    move = np.array(
-        [
-            [sx, 0, size / 2 - 0.5 - sx * (cx - 0.5)],
-            [0, sy, size / 2 - 0.5 - sy * (cy - 0.5)],
-        ]
-    )
-    result: Image = cv2.warpAffine(
-        color, move, (size, size), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-    )
-    return result
-
-
-def _inside(color: Image, cx: float, cy: float, side: float) -> tuple[Image, int, int]:
-    """The part of the image that a window shows, at least one pixel, and its top-left corner."""
-    rows, cols = color.shape[:2]
-    left = int(np.clip(np.floor(cx - side / 2) - 1, 0, cols - 1))
-    top = int(np.clip(np.floor(cy - side / 2) - 1, 0, rows - 1))
-    right = int(np.clip(np.ceil(cx + side / 2) + 1, left + 1, cols))
-    bottom = int(np.clip(np.ceil(cy + side / 2) + 1, top + 1, rows))
-    return color[top:bottom, left:right], left, top
 
 
 class PatchFeatures:

@@ -28,6 +28,8 @@ ROOM_AREA = 16.0
 """Square metres of floor that a camera sees: a stranger may be anywhere in it."""
 FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
+AGAIN = 0.25
+"""What twice as many sightings say more, as a share of what one says."""
 TRAVELLED = 0.5
 """Metres that a thing which was moved, or the noise of one, does not travel."""
 ELSEWHERE = 0.02
@@ -84,7 +86,7 @@ class Person:
         away = np.square(places - self.expected(time)).sum(axis=1)
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
-        anywhere = max(ELSEWHERE, 1 - float(np.exp(-max(gone - 0.2, 0) / FORGET)))
+        anywhere = max(ELSEWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
         density = np.exp(-0.5 * away / variance) / (2 * np.pi * variance)
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
@@ -98,6 +100,28 @@ class Person:
         """Mean log-odds, over all sightings, of looking like another; None if never compared."""
         total, count = self._resembles.get(other, (0.0, 0))
         return total / count if count else None
+
+    def resembles(self, other: int) -> float:
+        """Log-odds, by all sightings together, of looking like another; 0 if never compared.
+
+        Sightings of one walk say little more than one of them: that two people wear the same does
+        not change from frame to frame.
+        """
+        total, count = self._resembles.get(other, (0.0, 0))
+        return total / count * (1 + AGAIN * float(np.log2(count))) if count > 1 else 0.0
+
+    def become(self, newcomer: Person) -> None:
+        """Go on as somebody who has turned out to be the same."""
+        self.place, self.velocity = newcomer.place, newcomer.velocity
+        self.seen_at, self.last = newcomer.seen_at, newcomer.last
+        self.sightings += newcomer.sightings
+        self.area = max(self.area, newcomer.area)
+        self.upright |= newcomer.upright
+        self.mobile |= newcomer.mobile
+        self.met |= newcomer.met
+        self.travelled = max(self.travelled, newcomer.travelled)
+        for view in newcomer.gallery.views:
+            self.gallery.learn(view)
 
     def carried(self, motion: Pose, ahead: FloatArray) -> None:
         """Keep the place in the world while the camera moves.

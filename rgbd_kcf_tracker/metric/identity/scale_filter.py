@@ -15,6 +15,8 @@ import numpy.typing as npt
 from scipy import fft
 
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, CHANNELS, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
+from rgbd_kcf_tracker.features.windows import sampled
 
 STEP = 1.02
 COUNT = 17
@@ -37,8 +39,8 @@ class ScaleFilter:
         self._hog = HogExtractor(self._rows * COUNT, self._cols)
         steps = np.arange(COUNT) - COUNT // 2
         self._factors = STEP ** steps.astype(float)
-        label = np.exp(-0.5 * (steps / (0.25 * np.sqrt(COUNT))) ** 2)
-        self._label = np.conj(fft.rfft(fft.ifftshift(label))).astype(np.complex64)
+        label = gaussian_labels((COUNT,), 0.25 * np.sqrt(COUNT))
+        self._label = np.conj(fft.rfft(label)).astype(np.complex64)
         self._window = np.hanning(COUNT + 2)[1:-1].astype(np.float32)
         self._numerator: npt.NDArray[np.complex64] | None = None
         self._denominator: npt.NDArray[np.float32] | None = None
@@ -62,17 +64,10 @@ class ScaleFilter:
         stack = np.empty((self._rows * COUNT, self._cols), np.uint8)
         u, v = (cx - left) * fx, (cy - top) * fy
         for i, factor in enumerate(self._factors):
-            sx, sy = self._cols / (width * factor * fx), self._rows / (height * factor * fy)
-            move = np.array(
-                [
-                    [sx, 0, self._cols / 2 - 0.5 - sx * (u - 0.5)],
-                    [0, sy, self._rows / 2 - 0.5 - sy * (v - 0.5)],
-                ]
+            scale = self._cols / (width * factor * fx), self._rows / (height * factor * fy)
+            stack[i * self._rows : (i + 1) * self._rows] = sampled(
+                gray, u, v, scale, (self._cols, self._rows)
             )
-            stack[i * self._rows : (i + 1) * self._rows] = cv2.warpAffine(
-                gray, move, (self._cols, self._rows), flags=cv2.INTER_LINEAR,
-                borderMode=cv2.BORDER_REPLICATE,
-            )  # fmt: skip
         cells = (self._rows // CELL_SIZE, self._cols // CELL_SIZE)
         hog = self._hog(stack).reshape(CHANNELS, COUNT, *cells)
         samples = hog.transpose(0, 2, 3, 1).reshape(-1, COUNT) * self._window

@@ -11,6 +11,7 @@ from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import Recording
+from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters
 from rgbd_kcf_tracker.view.explain.depth_pictures import depth_pictures
 from rgbd_kcf_tracker.view.explain.filter_pictures import filter_pictures
 from rgbd_kcf_tracker.view.explain.metric_pictures import metric_chapter
@@ -23,6 +24,7 @@ from rgbd_kcf_tracker.view.explain.moments import (
 from rgbd_kcf_tracker.view.explain.page import Chapter
 from rgbd_kcf_tracker.view.explain.particle_pictures import particle_pictures
 
+_RGBD = RgbdParameters()
 VARIANTS = ('kcf', 'rgbd', 'rgbd_pf', 'metric')
 
 
@@ -56,8 +58,10 @@ def explain(
         chapters.append(
             Chapter(
                 'kcf', 'The correlation filter (kcf)',
-                'The filter is trained once on every shift of the first window, and from then on '
-                'answers for every shift of the next: chapter 2 of the thesis.',
+                'The filter learns from the first window, in all its shifts, what the target looks '
+                'like. In each later frame it looks where the target last was: the shift of that '
+                'window with the highest response says how far the target has moved, and there '
+                'the filter learns a little more. Chapter 2 of the thesis.',
                 filter_pictures(explain_filter(frames(), box, asked)),
             )
         )  # fmt: skip
@@ -67,8 +71,14 @@ def explain(
             Chapter(
                 'rgbd', 'Depth says when it is hidden (rgbd)',
                 'A low response alone does not say why: the target may have turned, or something '
-                'may stand in front of it. The depth at its centre tells the two apart: chapter 4 '
-                'of the thesis, Algorithm 1.',
+                'may stand in front of it. The depth at its centre tells the two apart. In each '
+                f'frame (Algorithm 1): the filter looks along the search space. A response above '
+                f'{_RGBD.detect_threshold:g} is the target. Below that, it is still the target '
+                'where the depth at its centre has not changed, by less than '
+                f'{_RGBD.depth_threshold:g} m; else it is hidden: no box is given, nothing is '
+                'learned, and the search space grows. To be taken for the target again without '
+                f'such a response, {(_RGBD.detect_threshold + _RGBD.hidden_response) / 2:g} and '
+                'its own depth are needed. Chapter 4 of the thesis.',
                 depth_pictures(moments), _missing(moments, recording),
             )
         )  # fmt: skip
@@ -76,8 +86,10 @@ def explain(
         chapters.append(
             Chapter(
                 'rgbd_pf', 'Particles carry on where nothing is seen (rgbd_pf)',
-                'Many guesses at where the target is and how it moves, kept or dropped by the '
-                'colours that they find: chapter 5 of the thesis, Algorithm 2.',
+                'A particle is one guess at where the target is, how it moves and how large it is. '
+                'Many of them are kept or dropped by the colours that they find, and say where '
+                'the filter should look next, also while the target is hidden. Chapter 5 of the '
+                'thesis, Algorithm 2.',
                 particle_pictures(explain_particles(frames(), box, asked)),
             )
         )  # fmt: skip

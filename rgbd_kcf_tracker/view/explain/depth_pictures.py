@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker
 from rgbd_kcf_tracker.thesis.depth_patch import DepthDifference, DepthPatch
 from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters, RgbdTracker
 from rgbd_kcf_tracker.track import TrackState
+from rgbd_kcf_tracker.view.explain.filter_pictures import GAUSSIAN_SIGNS
 from rgbd_kcf_tracker.view.explain.moments import DepthMoments, Moment
 from rgbd_kcf_tracker.view.explain.picture import (
     GIVEN,
@@ -32,9 +33,11 @@ from rgbd_kcf_tracker.view.explain.picture import (
     show_heat,
     show_image,
     show_mesh,
+    signs,
 )
 from rgbd_kcf_tracker.view.watch import Call, name_of
 
+_DEFAULTS = RgbdParameters()
 _DIFFERENCE = name_of(DepthPatch.diff_at_centre)
 _SEARCH = name_of(RgbdTracker._search)
 _PATCH = name_of(centre_patch.centre_patch)
@@ -103,9 +106,11 @@ def _patches(moment: Moment, call: Call) -> Picture:
         one.set(xlabel='x (samples)', ylabel='y (samples)')
     return Picture(
         '4.2', 'centre_patch', 'The depth about the centre of the target',
-        'Only the middle of the box is looked at, because at its edges there is background: at '
-        'the left the patch of the last frame that surely showed the target, at the right this '
-        'frame\'s. Grey means no reading, or not the target.',
+        f'Only the middle of the box is looked at ({100 * share:.0f} % of its width and height), '
+        'because at its edges there is background: below at the left this patch of the last frame '
+        'that surely showed the target, at the right of this frame, both on '
+        f'{patch.shape[1]} x {patch.shape[0]} samples, whatever the size of the box. Light grey '
+        'means no reading, or in the remembered one: not the target.',
         '', (_PATCH, name_of(DepthPatch.remember)), plot_style.png(figure),
         {'remembered': remembered, 'patch': patch, 'box': box.as_tuple()},
     )  # fmt: skip
@@ -117,6 +122,15 @@ def _range(*patches: Array) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = float(values.min()), float(values.max())
     return low, max(high, low + 0.01)
+
+
+_DIFFERENCE_SIGNS = signs(
+    ('D', 'the difference at each sample, in metres'),
+    ('d', "the new patch's depth there"),
+    ('r', "the remembered patch's"),
+    ('m', 'how far the target has come or gone by itself since, in metres'),
+    ('c', f'{_DEFAULTS.depth_cap:g} m: no sample counts for more'),
+)
 
 
 def _adjusting(moment: Moment, call: Call) -> Picture:
@@ -134,12 +148,13 @@ def _adjusting(moment: Moment, call: Call) -> Picture:
     )  # fmt: skip
     return Picture(
         '4.3', 'adjusting', 'The patch adjusts itself',
-        'The difference of the two patches; where the target has shifted in its box, background '
-        'stands at the edge like a wall. Edge columns and rows that differ too much are cut away, '
-        'a quarter of the patch at most.',
-        r'D = \vert\,patch - (remembered + motion)\,\vert',
+        f'The difference of the two patches, here of frame {moment.number}, where most had to be '
+        'cut: where the target has shifted in its box, background stands at the edge like a wall. '
+        f'Edge columns and rows that differ by more than {_DEFAULTS.trim_above:g} m on average '
+        f'are cut away, {100 * _DEFAULTS.most_trim:.0f} % of the patch at most at each edge.',
+        r'D = \min\left(\vert d - (r + m)\vert,\ c\right)',
         (_DIFFERENCE, name_of(depth_patch.trim)), plot_style.png(figure),
-        {'before': size, 'after': size[result.rows, result.cols]},
+        {'before': size, 'after': size[result.rows, result.cols]}, _DIFFERENCE_SIGNS,
     )  # fmt: skip
 
 
@@ -154,14 +169,14 @@ def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
     remembered, patch = call.given['self']['_patch'], call.given['patch']
     left = size[result.rows, result.cols]
     low, high = _range(remembered, patch)
-    figure = plot_style.figure(9.5, 3.6)
-    show_heat(
-        figure.add_subplot(1, 3, 1), remembered, 'remembered', 'depth (m)', low=low, high=high
-    )
-    show_heat(
-        figure.add_subplot(1, 3, 2), patch, f'frame {moment.number}', 'depth (m)',
-        low=low, high=high,
-    )  # fmt: skip
+    figure = plot_style.figure(9.8, 3.9)
+    for place, values, title in (
+        (1, remembered, 'remembered'),
+        (2, patch, f'frame {moment.number}'),
+    ):
+        axes = figure.add_subplot(1, 3, place)
+        show_heat(axes, values, title, 'depth (m)', low=low, high=high)
+        axes.set(xlabel='x (samples)', ylabel='y (samples)')
     show_mesh(
         figure, (1, 3, 3), left, f'difference: {result.value:.3f} m', '(m)',
         low=0, high=0.5, axes_label='samples',
@@ -169,8 +184,9 @@ def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
     hidden = moment.track.state is not TrackState.TRACKING
     threshold = RgbdParameters().depth_threshold
     what = (
-        f'After adjusting, {result.value:.3f} m are left on average, of which '
-        f'{abs(result.nearer):.3f} m came nearer; the threshold is {threshold:g} m.'
+        f'After adjusting, a difference of {result.value:.3f} m is left on average, of which '
+        f'{abs(result.nearer):.3f} m is nearer than the target was; the threshold is '
+        f'{threshold:g} m.'
     )
     verdict = 'What is left is flat: nothing has come in front, and the target counts as seen.'
     if hidden and result.nearer >= threshold:
@@ -185,12 +201,17 @@ def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
         )
     return Picture(
         number, f'difference_{word}', f'The difference {word} an occluder',
-        f'{what} {verdict}', r'D_{diff} = \mathrm{mean}\,\vert\,patch - remembered\,\vert',
+        f'{what} {verdict}', r'D_{\mathrm{diff}} = \mathrm{mean}\ D',
         (_DIFFERENCE, name_of(DepthAwareTracker._occlusion_status)), plot_style.png(figure),
         {
             'remembered': remembered, 'patch': patch, 'difference': left,
             'D_diff': result.value, 'nearer': result.nearer,
         },
+        signs(
+            (r'D_{\mathrm{diff}}', 'what the occlusion is decided by, in metres'),
+            ('D', 'the differences of the picture before, where both patches have a reading and '
+             'nothing was cut away'),
+        ),
     )  # fmt: skip
 
 
@@ -234,8 +255,15 @@ def _search_space(moment: Moment, hidden: Moment | None) -> Picture:
         'The window slides along the horizontal, because people do not fly; how far grows with the '
         "target's width, so that a near target is not lost and a far one costs no more. While it "
         'is hidden the space grows with every moment, until the whole image is searched.',
-        r'span = (s + \lceil v \cdot t_{hidden} \rceil) \cdot width',
+        r'\mathrm{span} = (s + \lceil v\,t \rceil) \cdot w',
         (name_of(sliding_window.search_span), _SEARCH), plot_style.png(figure), values,
+        signs(
+            (r'\mathrm{span}', 'how far the window slides to either side, in pixels'),
+            ('s', f'{_DEFAULTS.search_span:g}: target widths while it is seen'),
+            ('v', f'{_DEFAULTS.search_speed:g}: target widths more for each second hidden'),
+            ('t', 'seconds for which it has been hidden'), ('w', "the target's width in pixels"),
+            (r'\lceil\ \rceil', 'rounded up'),
+        ),
     )  # fmt: skip
 
 
@@ -259,11 +287,12 @@ def _correlations(moment: Moment) -> Picture:
     return Picture(
         '4.10', 'correlations', 'Correlation with every patch of the search space',
         'The features of every window are compared with those learned, all windows in one batch. '
-        'At the right the likeness of each window, at the left the best one at all its shifts.',
+        'At the right the highest likeness of each window, at the left that of the best one at all '
+        'its shifts.',
         r'k^{xz} = \exp\left(-\frac{1}{\sigma^2 N}\left(\Vert x\Vert^2 + \Vert z\Vert^2'
         r' - 2F^{-1}(\hat{x}^* \odot \hat{z})\right)\right)',
         ('thesis.correlation:_gaussian', _SEARCH), plot_style.png(figure),
-        {'kernel': kernel, 'best': best},
+        {'kernel': kernel, 'best': best}, signs(*GAUSSIAN_SIGNS),
     )  # fmt: skip
 
 
@@ -294,10 +323,17 @@ def _responses(shown: list[tuple[str, Moment]]) -> Picture:
     return Picture(
         '4.11', 'responses', 'The response of a target that is seen, covered, and hidden',
         f'The highest response is {", ".join(peaks)}: the more is hidden, the lower the hill. '
-        'The dashed box is where the best patch lies; above 0.5 it is the target whatever the '
-        'depth says, below that the depth is asked.',
+        'The dashed box is where the best patch lies; above '
+        f'{_DEFAULTS.detect_threshold:g} it is the target whatever the depth says, below that '
+        'the depth is asked.',
         r'f(z) = F^{-1}(\hat{k}^{xz} \odot \hat{\alpha})',
         (name_of(CorrelationFilter.respond), _SEARCH), plot_style.png(figure), values,
+        signs(
+            ('f(z)', 'the response; the higher of what two filters say: the one that goes on '
+             'learning, and the one of the first frame'),
+            'F', (r'\hat{k}^{xz}', 'the Fourier transform of the likeness at every shift'), 'times',
+            'alpha',
+        ),
     )  # fmt: skip
 
 
@@ -309,10 +345,20 @@ def _over_time(moments: DepthMoments) -> Picture:
     figure = plot_style.figure(9.5, 4.0)
     top, low = figure.subplots(2, 1, sharex=True)
     top.plot(numbers, response, color=SEEN, lw=1.5, label='response')
-    top.axhline(RgbdParameters().detect_threshold, color='#555555', lw=1, ls='--')
+    again = (_DEFAULTS.detect_threshold + _DEFAULTS.hidden_response) / 2
+    for level, style, words in (
+        (_DEFAULTS.detect_threshold, '--', 'the target'),
+        (again, ':', 'the target again, by depth'),
+    ):  # fmt: skip
+        top.axhline(level, color='#555555', lw=1, ls=style, label=f'above {level:g}: {words}')
+    top.legend(fontsize=8, frameon=False, loc='upper right', ncols=3)
     top.set(ylabel='response', ylim=(0, max(1.0, float(response.max()) * 1.05)))
     low.plot(numbers, difference, color=GIVEN, lw=1.5, label='depth difference')
-    low.axhline(RgbdParameters().depth_threshold, color='#555555', lw=1, ls='--')
+    low.axhline(
+        _DEFAULTS.depth_threshold, color='#555555', lw=1, ls='--',
+        label=f'above {_DEFAULTS.depth_threshold:g} m: hidden',
+    )  # fmt: skip
+    low.legend(fontsize=8, frameon=False, loc='upper left', ncols=2)
     low.set(ylabel='D_diff (m)', xlabel='frame')
     for axes in (top, low):
         plot_style.tidy(axes)
@@ -326,9 +372,10 @@ def _over_time(moments: DepthMoments) -> Picture:
                     axes.plot(numbers[row], ys[row], mark, color='black', ms=7)
     return Picture(
         '', 'over_time', 'Response and depth over time',
-        'The two readings that Algorithm 1 decides by, with their thresholds dashed; grey is where '
-        'the target counted as hidden. The marks are the frames shown above: visible (triangle), '
-        'partly hidden (square), hidden (cross).',
+        'The two readings that Algorithm 1 decides by, with their thresholds; grey is where the '
+        'target counted as hidden, and it is taken back only where both say so, or the response '
+        'is high. The marks are the frames shown above: visible (triangle), partly hidden '
+        '(square), hidden (cross).',
         '', (_SEARCH, _DIFFERENCE), plot_style.png(figure),
         {'frames': numbers, 'response': response, 'D_diff': difference},
     )  # fmt: skip

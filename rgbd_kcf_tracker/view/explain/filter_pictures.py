@@ -11,10 +11,11 @@ import numpy as np
 
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.thesis import correlation, window
 from rgbd_kcf_tracker.thesis.correlation import CorrelationFilter, linear_correlation
-from rgbd_kcf_tracker.thesis.kcf import KcfModel, KcfTracker, WindowGeometry
+from rgbd_kcf_tracker.thesis.kcf import KcfModel, KcfParameters, KcfTracker, WindowGeometry
 from rgbd_kcf_tracker.view.explain.circulant import (
     block_circulant,
     circulant,
@@ -36,12 +37,20 @@ from rgbd_kcf_tracker.view.explain.picture import (
     show_heat,
     show_image,
     show_mesh,
+    signs,
 )
 from rgbd_kcf_tracker.view.watch import Function, name_of
 
 _SHORT = 8
 _PATCH = 30
 _CELLS = 7
+GAUSSIAN_SIGNS: tuple[str | tuple[str, str], ...] = (
+    'k', 'x', 'z', (r'\Vert x\Vert^2', 'the sum of the squares of its numbers'),
+    (r'\sigma', f'{KcfParameters().kernel_sigma:g}: how fast likeness falls off with difference'),
+    ('N', 'how many numbers x has: features times cells'),
+    'hat', 'star', 'times', 'F',
+)  # fmt: skip
+"""Of the equation of the Gaussian kernel."""
 _GRAY = {'cmap': 'gray', 'vmin': 0, 'vmax': 255}
 
 
@@ -98,9 +107,13 @@ def _preparing(moments: FilterMoments) -> list[Picture]:
             '2.7, 2.8, 2.10', 'window', 'Target and window',
             'The box is the target as it was given; the dashed window about it is larger by the '
             'padding, so that the filter also learns what the target is not. The window is cut '
-            'out, made grey, and halved where the target is large.',
-            r'window = (1 + padding) \cdot target', _named(WindowGeometry.of, window.gray_window),
+            'out and made grey, a target of more than '
+            f'{KcfParameters().halve_above:g} pixels across is halved to save time, and what lies '
+            'outside the frame repeats its border.',
+            r'\mathrm{window} = (1 + p) \cdot \mathrm{target}',
+            _named(WindowGeometry.of, window.gray_window),
             plot_style.png(figure), {'gray': gray, 'box': box.as_tuple()},
+            (('p', f'padding: {KcfParameters().padding:g} targets more, across and down'),),
         )
     ]  # fmt: skip
 
@@ -126,14 +139,15 @@ def _circulants(first: Moment) -> list[Picture]:
             'target, and the matrix that has every shift as one row. Blocks repeat along the '
             'diagonals, and so do the pixels within each block: the whole matrix is known from '
             'its first row.',
-            'grey value', _named(window.gray_window),
+            'grey value', _named(window.gray_window, block_circulant),
         ),
         _shifts(
             inner[channel], '2.5', 'block_circulant_hog', 'Cells of HOG and all their shifts',
-            f'The same for one of the 31 channels of the features (channel {channel}) in the '
-            f'{cells} x {cells} cells in the middle of the target. This is what the filter is '
-            'trained on: every shift of the features, each a training sample at no cost.',
-            'feature', _named(HogExtractor.__call__),
+            f'The same for one of the {len(hog)} features (number {channel}: how strong the edges '
+            f'of one direction are) in the {cells} x {cells} cells in the middle of the target. '
+            'This is what the filter learns from: every shift of the features, each an example '
+            'at no cost.',
+            'feature', _named(HogExtractor.__call__, block_circulant),
         ),
     ]  # fmt: skip
 
@@ -160,10 +174,19 @@ def _numbers(short: Array) -> Picture:
     return Picture(
         '2.1', 'circulant_numbers', 'A circulant matrix in numbers',
         f'{len(short)} neighbouring grey values of the target, and below them the same values '
-        'moved on one by one, what leaves at the right coming back at the left. Multiplying by P '
-        'once moves the signal by one, so the rows are x, Px, P\u00b2x and so on.',
-        r'C(x) = [\,x,\ Px,\ P^2x,\ \ldots,\ P^{n-1}x\,]^T', _named(window.gray_window),
+        'moved on one by one, what leaves at the right coming back at the left: each row is one '
+        'shift. The trackers never build such a matrix, but what they compute stands for it, as '
+        'the next picture shows; this page has built it from the values that they cut out.',
+        r'C(x) = [\,x,\ Px,\ P^2x,\ \ldots,\ P^{n-1}x\,]^T',
+        _named(window.gray_window, permutation, circulant),
         plot_style.png(figure), {'signal': short, 'matrix': matrix, 'permutation': shift},
+        signs(
+            ('x', f'a signal: here {len(short)} grey values, 0 is black and 255 white'),
+            ('P', 'the matrix that moves a signal on by one'),
+            ('C(x)', 'the circulant matrix: all shifts of the signal'),
+            ('n', f'length of the signal: {len(short)}'),
+            (r'[\ ]^T', 'one row for each entry'),
+        ),
     )  # fmt: skip
 
 
@@ -177,20 +200,31 @@ def _line(short: Array) -> Picture:
     show_heat(axes[0], matrix, 'C(x)', 'grey value')
     axes[0].set(xlabel='sample', ylabel='shift')
     places = np.arange(len(short))
-    axes[1].bar(places - 0.2, by_hand, 0.4, color=SEEN, label='C(x) x / n')
+    axes[1].bar(places - 0.2, by_hand, 0.4, color=SEEN, label='with the matrix: C(x) x / n')
     axes[1].bar(
-        places + 0.2, by_filter, 0.4, color=OTHER, hatch='//', label='linear_correlation(x, x)'
+        places + 0.2,
+        by_filter,
+        0.4,
+        color=OTHER,
+        hatch='//',
+        label='as the filter does it, without',
     )
     axes[1].set(xlabel='shift (samples)', ylabel='correlation (grey value²)')
     axes[1].legend(fontsize=8, frameon=False, loc='upper center', bbox_to_anchor=(0.5, -0.2))
     plot_style.tidy(axes[1])
     return Picture(
         '2.2', 'circulant_signal', 'The same matrix as a picture, and why it need not be built',
-        'Along each diagonal of the matrix there is one value. Its product with the signal (the '
-        'correlation at every shift) comes out the same from the filter, which only multiplies '
-        'two spectra: the bars are pairwise equal.',
-        r'C(x)\,z = F^{-1}(\hat{x}^* \odot \hat{z})', _named(linear_correlation),
+        'Along each diagonal of the matrix there is one value. The matrix times a signal is the '
+        'likeness (correlation) of the two at every shift, and comes out the same where their '
+        'Fourier transforms are multiplied, which is much faster: the bars are pairwise equal.',
+        r'\frac{1}{n}\,C(x)\,z = \frac{1}{n}\,F^{-1}(\hat{x}^* \odot \hat{z})',
+        _named(circulant, linear_correlation),
         plot_style.png(figure), {'matrix': matrix, 'product': by_hand, 'correlation': by_filter},
+        signs(
+            ('C(x)', 'the matrix of the picture before'),
+            ('x,\\ z', 'two signals; here z is x itself'), ('n', 'their length'),
+            'hat', 'star', 'times', 'F',
+        ),
     )  # fmt: skip
 
 
@@ -212,8 +246,14 @@ def _blocks(patch: Array) -> Picture:
         'A patch is shifted both ways, so its matrix is a circulant of blocks (between the white '
         'lines) that are circulants themselves. Each block is one row of the patch, and the '
         'blocks move on along the diagonal as the pixels within them do.',
-        r'X = [\,C_1,\ C_2,\ \ldots;\ C_m,\ C_1,\ \ldots\,]', _named(window.gray_window),
+        r'X = \left[\,C_1\ C_2 \ldots C_m\,;\ C_m\ C_1 \ldots C_{m-1}\,;\ \ldots\,\right]',
+        _named(window.gray_window, block_circulant),
         plot_style.png(figure), {'patch': patch, 'matrix': matrix},
+        signs(
+            ('X', 'the matrix: a row for each shift of the patch'),
+            ('C_1', 'the circulant matrix of the first row of the patch, and so on'),
+            ('m', f'rows of the patch: {rows}'), (';', 'ends a row of blocks'),
+        ),
     )  # fmt: skip
 
 
@@ -239,11 +279,15 @@ def _shifts(
     return Picture(
         number, name, title, words, r'X = C(x)', functions, plot_style.png(figure),
         {'patch': patch, 'matrix': matrix},
+        signs(
+            ('x', f'the {patch.shape[0]} x {patch.shape[1]} values, row after row'),
+            ('C(x)', 'their block-circulant matrix, as above'), ('X', 'all that is learned from'),
+        ),
     )  # fmt: skip
 
 
 def _labels(first: Moment) -> Picture:
-    call = _calls(first, correlation.gaussian_labels)[0]
+    call = _calls(first, gaussian_labels)[0]
     labels = centred(call.value)
     figure = plot_style.figure(9.5, 4.2)
     show_mesh(figure, (1, 2, 1), labels, 'from the side', 'label', low=0, high=1)
@@ -255,10 +299,14 @@ def _labels(first: Moment) -> Picture:
         'For every shift of the window there is a wanted answer: 1 where the target is in the '
         'middle, falling off to 0 with the distance. A filter that has learned this answers with a '
         'hill, and the top of the hill is the target.',
-        r'y = \exp\left(-\frac{\Delta x^2 + \Delta y^2}{2\sigma^2}\right)'
-        rf',\quad \sigma = {call.given["sigma"]:.2f}\ cells',
-        _named(correlation.gaussian_labels), plot_style.png(figure),
+        r'y = \exp\left(-\frac{\Delta x^2 + \Delta y^2}{2\sigma^2}\right)',
+        _named(gaussian_labels), plot_style.png(figure),
         {'labels': call.value, 'sigma': call.given['sigma']},
+        signs(
+            ('y', 'the wanted answer (label) for a shift'),
+            (r'\Delta x,\ \Delta y', 'the shift, in cells; here 0 is drawn in the middle'),
+            (r'\sigma', f'width of the hill: {call.given["sigma"]:.2f} cells'),
+        ),
     )  # fmt: skip
 
 
@@ -268,10 +316,20 @@ def _features(moment: Moment, number: str, name: str, title: str) -> Picture:
     hog = _calls(moment, HogExtractor.__call__)[0].value
     tapered = sample.found['features']
     taper = sample.given['self']['taper']
+    sign = 'x' if name == 'features' else 'z'
+    words = (
+        f'Each cell of {CELL_SIZE} x {CELL_SIZE} pixels is described by {hog.shape[0]} numbers '
+        'that say which way the edges in it run and how strong they are. The cosine window fades '
+        'them out towards the border, where the shifts of the window wrap round.'
+        if name == 'features'
+        else f'The window of frame {moment.number}, cut out where the target was in frame '
+        f'{moment.number - 1}: it stands a little beside the middle, by as much as it has moved. '
+        'Features and cosine window are made as for the first frame.'
+    )
     # The unsigned orientations, 18 to 26: one picture of the edges, brightest where strong.
     figure = plot_style.figure(9.5, 3.4)
     axes = figure.subplots(1, 4)
-    show_image(axes[0], gray, 'patch', **_GRAY)
+    show_image(axes[0], gray, f'window of frame {moment.number}', **_GRAY)
     show_heat(axes[1], hog[18:27].sum(axis=0), 'fHOG, 9 orientations summed', 'feature')
     show_heat(axes[2], taper, 'cosine window', 'weight', low=0, high=1)
     show_heat(axes[3], tapered[18:27].sum(axis=0), 'features, windowed', 'feature')
@@ -279,15 +337,20 @@ def _features(moment: Moment, number: str, name: str, title: str) -> Picture:
         one.set_xticks([])
         one.set_yticks([])
     return Picture(
-        number, name, title,
-        f'Each cell of {CELL_SIZE} x {CELL_SIZE} pixels is described by {hog.shape[0]} numbers '
-        'that say which way the edges in it run and how strong they are. The cosine window fades '
-        'them out towards the border, where the shifts of the window wrap round.',
-        r"x = \mathrm{fHOG}(patch) \odot (h\,h'^T),\quad "
+        number, name, title, words,
+        rf"{sign} = \mathrm{{fHOG}}(\mathrm{{window}}) \odot (h\,h'^T),\quad "
         r'h_i = \frac{1}{2}(1 - \cos\frac{2\pi i}{n-1})',
         _named(HogExtractor.__call__, correlation.cosine_window, KcfModel.sample),
         plot_style.png(figure),
         {'gray': gray, 'hog': hog, 'taper': taper, 'features': tapered},
+        signs(
+            (sign, 'the windowed features'),
+            (r'\mathrm{fHOG}', 'histograms of the directions of edges (gradients) in each cell'),
+            'times',
+            (r"h\,h'^T", 'the fading down times the fading across, in every cell'),
+            ('h_i', 'the fading at cell i'),
+            ('i', 'the cell, from 0'), ('n', 'the number of cells down, or across'),
+        ),
     )  # fmt: skip
 
 
@@ -307,12 +370,20 @@ def _training(first: Moment) -> Picture:
     axes.set(xlabel='frequency across', ylabel='frequency down (middle is 0)')
     return Picture(
         '', 'training', 'Training',
-        'At the left how alike the window is to itself at every shift: 1 for no shift, less '
-        'everywhere else. One division per frequency turns it into the coefficients at the right, '
-        'which is the whole training.',
+        'At the left how alike the window is to itself at every shift (the kernel): 1 for no '
+        'shift, less everywhere else. One division per frequency turns that and the labels into '
+        'the coefficients at the right, which is the whole training.',
         r'\hat{\alpha} = \frac{\hat{y}}{\hat{k}^{xx} + \lambda}',
         _named(CorrelationFilter.learn, GAUSSIAN), plot_style.png(figure),
         {'kernel': kernel, 'alpha': alpha},
+        signs(
+            'alpha', (r'\hat{y}', 'the Fourier transform of the labels'),
+            (r'\hat{k}^{xx}', 'that of the likeness of the window to itself at every shift'),
+            (
+                r'\lambda',
+                f'{learned.given["self"]["_regularization"]:g}: keeps the coefficients small',
+            ),
+        ),
     )  # fmt: skip
 
 
@@ -327,8 +398,9 @@ def _trained_position(moments: FilterMoments) -> Picture:
     legend(axes)
     return Picture(
         '2.12', 'trained', 'Where it was trained',
-        'The filter has been trained with the target in the middle of this box. In the next frame '
-        'it looks about the same place.',
+        f'The filter was first trained in frame {first.number}, with the target in the middle of '
+        'this box. In each frame since it has looked where the target was in the frame before, '
+        f'and has taken over {100 * KcfParameters().learning_rate:g} % of what it found there.',
         '', _named(KcfModel.train), plot_style.png(figure), {'box': box.as_tuple()},
     )  # fmt: skip
 
@@ -354,10 +426,11 @@ def _detecting(moments: FilterMoments) -> list[Picture]:
     cross = Picture(
         '2.14', 'cross_correlation', 'Cross-correlation with what was learned',
         'How alike the new window, at every shift, is to the features that the filter has '
-        'learned: 1 would be the same picture. It already peaks near the target, but broadly.',
+        'learned: 1 would be the same picture. It is highest near the target, but only a little.',
         r'k^{xz} = \exp\left(-\frac{1}{\sigma^2 N}\left(\Vert x\Vert^2 + \Vert z\Vert^2'
         r' - 2F^{-1}(\hat{x}^* \odot \hat{z})\right)\right)',
         _named(GAUSSIAN), plot_style.png(figure), {'kernel': kernel},
+        signs(*GAUSSIAN_SIGNS),
     )  # fmt: skip
 
     figure = plot_style.figure(9.5, 4.2)
@@ -376,12 +449,16 @@ def _detecting(moments: FilterMoments) -> list[Picture]:
     answer = Picture(
         '2.15', 'response', 'The response, and its peak',
         'The coefficients sharpen the cross-correlation into the hill that the labels asked for. '
-        f'Its top, {found.response:.3f}, lies {found.fine_cx - cx:+.1f} px across and '
-        f'{found.fine_cy - cy:+.1f} px down from where the filter looked (the cross): so far the '
-        'target has moved.',
+        f'Its top, {found.response:.3f} (the cross), lies {found.fine_cx - cx:+.1f} px across and '
+        f'{found.fine_cy - cy:+.1f} px down from where the filter looked, which is 0, 0: so far '
+        'the target has moved.',
         r'f(z) = F^{-1}(\hat{k}^{xz} \odot \hat{\alpha})',
         _named(CorrelationFilter.respond, correlation.peak), plot_style.png(figure),
         {'response': response, 'peak': found.response},
+        signs(
+            'f', 'F', (r'\hat{k}^{xz}', 'the Fourier transform of the cross-correlation'),
+            'times', 'alpha',
+        ),
     )  # fmt: skip
 
     figure = plot_style.figure(9.5, 4.2)
@@ -398,8 +475,13 @@ def _detecting(moments: FilterMoments) -> list[Picture]:
         'The dashed box is where the target was in the frame before; the full box is moved by the '
         'peak. The filter is trained again here, mixed with what it knew, and goes on to the '
         'next frame.',
-        r'(x, y)_{new} = (x, y) + \arg\max f(z)', _named(KcfModel.place, KcfTracker.update),
+        r'(u, v)_{\mathrm{new}} = (u, v) + \arg\max f(z)',
+        _named(KcfModel.place, KcfTracker.update),
         plot_style.png(figure), {'box': box.as_tuple(), 'looked': looked.as_tuple()},
+        signs(
+            ('u,\\ v', 'middle of the box in the frame, pixels across and down'),
+            (r'\arg\max', 'the shift at which the response is highest'), 'f',
+        ),
     )  # fmt: skip
     patch = _features(asked, '2.13', 'new_features', 'The same window in the new frame')
     return [patch, cross, answer, result]

@@ -15,6 +15,9 @@ from matplotlib.axes import Axes
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.metric.decide.evidence import CUE_WORDS
+from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import create_tracker
 from rgbd_kcf_tracker.view.explain.moments import MOST_AHEAD
@@ -29,10 +32,12 @@ from rgbd_kcf_tracker.view.explain.picture import (
     legend,
     rgb,
     show_image,
+    signs,
 )
-from rgbd_kcf_tracker.view.insight import COMPUTED_BY, Insight, insight_of
+from rgbd_kcf_tracker.view.insight import COMPUTED_BY, Insight, colors_of, insight_of
 from rgbd_kcf_tracker.view.watch import name_of
 
+_DEFAULTS = MetricParameters()
 _SHOWN = 4
 """Candidates whose odds are drawn."""
 _REST_S = 0.4
@@ -80,7 +85,10 @@ def metric_chapter(frames: Iterable[tuple[int, Frame]], box: Box, asked: int) ->
     return Chapter(
         'metric', 'Surfaces in metres (metric)',
         'The default tracker cuts the depth image into surfaces and asks of each whether it is the '
-        'target; the cues add up to log-odds, and the best one wins if it is likely enough.',
+        'target. What it measures of a surface adds up to log-odds: 0 is even, +3 is 20 to 1 for '
+        f'it, -3 is 20 to 1 against. The best one is taken from {_DEFAULTS.acceptance:g} of '
+        'probability on; else the target is hidden, and particles carry on where it may be. The '
+        'correlation filter is asked only where depth says nothing of the target.',
         pictures, missing.strip(),
     )  # fmt: skip
 
@@ -90,7 +98,7 @@ def _surfaces(seen: _Seen) -> Picture:
     labels, depth = insight.surfaces, insight.view_depth
     assert labels is not None
     assert depth is not None
-    figure = plot_style.figure(9.5, 3.4)
+    figure = plot_style.figure(9.5, 2.3)
     axes = figure.subplots(1, 3)
     show_image(axes[0], rgb(frame), f'frame {number}')
     show_image(
@@ -101,9 +109,18 @@ def _surfaces(seen: _Seen) -> Picture:
     return Picture(
         '', 'surfaces', 'Depth cut into surfaces',
         'Neighbouring pixels belong together where the depth between them does not jump. The floor '
-        'is taken out first, so that what stands on it comes apart; white is floor or no reading.',
-        r'\vert z_i - z_j\vert \leq j_0 + j_1 z', tuple(map(name_of, COMPUTED_BY['surfaces'])),
+        'is taken out first, so that what stands on it comes apart; white is floor or no reading, '
+        'and the colours only tell neighbours apart.',
+        r'\vert z_i - z_j\vert \leq j_0 + j_1 z_i', tuple(map(name_of, COMPUTED_BY['surfaces'])),
         plot_style.png(figure), {'labels': labels, 'depth': depth},
+        signs(
+            ('z_i,\\ z_j', 'depth of two neighbouring pixels, metres'),
+            (
+                'j_0,\\ j_1',
+                f'the jump allowed: {_DEFAULTS.jump:g} m, and {_DEFAULTS.jump_per_metre:g} m more '
+                'for each metre of distance',
+            ),
+        ),
     )  # fmt: skip
 
 
@@ -138,8 +155,11 @@ def _candidates(seen: _Seen) -> Picture:
     axes[0].set_ylim(frame.height - 0.5, -0.5)
     legend(axes[0])
     values: dict[str, Any] = {'probability': [c.probability for c in insight.considered]}
+    shown_cues: list[str] = []
     if shown:
-        names = [name for name in shown[0].cues if any(abs(c.cues[name]) > 0.005 for c in shown)]
+        names = shown_cues = [
+            name for name in shown[0].cues if any(abs(c.cues[name]) > 0.005 for c in shown)
+        ]
         places = np.arange(len(names))
         for index, one in enumerate(shown):
             values[f'cues_{index + 1}'] = [one.cues[name] for name in one.cues]
@@ -162,12 +182,24 @@ def _candidates(seen: _Seen) -> Picture:
     verdict = 'nothing was taken' if track.box is None else 'the first was taken'
     return Picture(
         '', 'candidates', 'Silhouettes, and what speaks for each',
-        f'The silhouettes that could be the target, with the box that each would give; {verdict}. '
+        f'The silhouettes that could be the target (what is surely somebody else or the room is '
+        f'not among them), with the box that each would give; {verdict}. '
         'Bars to the right speak for a candidate and bars to the left against it, and their sum '
         'is its log-odds.',
         r'\ln\frac{p}{1-p} = \sum_i w_i f_i', tuple(map(name_of, COMPUTED_BY['considered'])),
         plot_style.png(figure), values,
+        signs(
+            ('p', 'the probability that the candidate is the target'),
+            (r'\ln', 'the natural logarithm; of p / (1 - p) it is the log-odds'),
+            ('f_i', 'what was measured of it'),
+            ('w_i', 'how much that counts, fitted once to many frames'),
+            *((_in_words(name), CUE_WORDS[name]) for name in shown_cues),
+        ),
     )  # fmt: skip
+
+
+def _in_words(name: str) -> str:
+    return r'\mathrm{' + name.replace(' ', '\\ ') + '}'
 
 
 def _count(number: int, word: str) -> str:
@@ -197,8 +229,8 @@ def _gallery(seen: _Seen) -> Picture:
     show_image(axes[0], rgb(frame), f'frame {number}')
     if track.box is not None:
         draw_box(axes[0], track.box, SEEN)
-    slices = max(len(view) for view in insight.gallery)
-    stripes = np.stack([*insight.gallery], axis=1)
+    stripes = np.stack([colors_of(view) for view in insight.gallery], axis=1)
+    slices = len(stripes)
     axes[1].set_facecolor(plot_style.NOTHING)
     axes[1].imshow(np.ma.masked_invalid(stripes).filled(0.85), interpolation='nearest')
     axes[1].set_xticks(range(len(insight.gallery)))
@@ -208,12 +240,21 @@ def _gallery(seen: _Seen) -> Picture:
     axes[1].set_aspect('auto')
     return Picture(
         '', 'gallery', 'The gallery by which it is known',
-        'Of each view that is remembered the body is cut into slices of equal height, and each '
-        'keeps how often every colour shows in it; drawn is the mean. A candidate is compared with '
-        'all of them, from head to feet, and the best one says how likely it is the same person.',
+        'Of each view that is remembered the body is cut into slices of '
+        f'{100 * gallery.SLICE:.0f} cm, and each keeps how often every colour shows in it; drawn '
+        'is the mean. A candidate is compared with all views, slice by slice, and the most alike '
+        'one says how likely it is the same person (the cue "look").',
         r's = \max_v \sum_k a_k \sum_u \sqrt{p_{k,u}\ q^v_{k,u}}',
-        tuple(map(name_of, COMPUTED_BY['gallery'])), plot_style.png(figure),
-        {'colors': stripes},
+        (*map(name_of, COMPUTED_BY['gallery']), name_of(gallery.similarity)),
+        plot_style.png(figure), {'colors': stripes},
+        signs(
+            ('s', 'the likeness: 1 for the same colours at the same heights'),
+            ('v', 'a view of the gallery'), ('k', 'a slice, from head to feet'),
+            ('a_k', 'how much it counts: the more of it shows, the more colourful it is'),
+            ('u', 'a colour'),
+            ('p_{k,u}', "its share of the candidate's slice"),
+            ('q^v_{k,u}', "its share of the view's"),
+        ),
     )  # fmt: skip
 
 
@@ -234,7 +275,7 @@ def _from_above(seen: _Seen) -> Picture:
     show_image(axes[0], rgb(frame), f'frame {number}: the target is hidden')
     axes[1].plot(x, z, '.', ms=1, color='#888888', label='what the camera sees')
     axes[1].scatter(
-        particles[:, 0], particles[:, 2], s=2 + 30 * weights / weights.max(), c=GIVEN, lw=0,
+        particles[:, 0], particles[:, 2], s=1 + 10 * weights / weights.max(), c=GIVEN, lw=0,
         label='particles', zorder=3,
     )  # fmt: skip
     axes[1].plot(0, 0, '^', color=SEEN, ms=10, label='camera')
@@ -256,7 +297,16 @@ def _from_above(seen: _Seen) -> Picture:
         'Particles go on in metres with the velocity that the target had, and spread with time. '
         'Where the camera sees past a particle nobody stands, so it fades: what is left lies '
         'behind something.',
-        r'w_i \propto w_i\,e^{-\Delta t/\tau}\ \mathrm{where}\ z_{seen} > z_i + m',
+        r'w_i \propto w_i\,e^{-t/\tau}\ \ \mathrm{where}\ \ z > z_i + m',
         tuple(map(name_of, COMPUTED_BY['particles'])),
         plot_style.png(figure), {'particles': particles, 'weights': weights},
+        signs(
+            ('w_i', 'the weight of particle i; all together are 1'),
+            (r'\propto', 'but for a factor, which makes them so'),
+            ('t', 'seconds since the frame before'),
+            (r'\tau', f'{hidden_cloud.EMPTY_TIME:g} s, in which a weight falls to a third'),
+            ('z', 'depth that the camera measures where the particle would be seen, metres'),
+            ('z_i', "the particle's own"),
+            ('m', f'{hidden_cloud.EMPTY_MARGIN:g} m, to be sure'), ('e', '2.718…'),
+        ),
     )  # fmt: skip

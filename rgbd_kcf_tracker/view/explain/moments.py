@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rgbd_kcf_tracker.features.hog import HogExtractor
+from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.thesis import (
@@ -52,7 +53,7 @@ DIFFERENCE = DepthPatch.diff_at_centre
 SEARCH = RgbdTracker._search
 
 FILTER_PARTS = (
-    correlation.gaussian_labels,
+    gaussian_labels,
     correlation.cosine_window,
     correlation.peak,
     window.gray_window,

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from rgbd_kcf_tracker.evaluation import plot_style
+from rgbd_kcf_tracker.features.sampling import systematic_resample
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.thesis.color_histogram import ColorHistogram, bhattacharyya_distance
 from rgbd_kcf_tracker.thesis.particle_filter import (
@@ -20,8 +21,8 @@ from rgbd_kcf_tracker.thesis.particle_filter import (
     X,
     Y,
     normal_likelihood,
-    systematic_resample,
 )
+from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfParameters
 from rgbd_kcf_tracker.view.explain.moments import Moment, ParticleMoments
 from rgbd_kcf_tracker.view.explain.picture import (
     GIVEN,
@@ -33,6 +34,7 @@ from rgbd_kcf_tracker.view.explain.picture import (
     legend,
     rgb,
     show_image,
+    signs,
 )
 from rgbd_kcf_tracker.view.watch import Call, name_of
 
@@ -52,9 +54,10 @@ def particle_pictures(moments: ParticleMoments) -> list[Picture]:
 def _scatter_plot(axes: Axes, states: Array, weights: Array | None = None) -> None:
     x = states[:, X] + states[:, WIDTH] / 2
     y = states[:, Y] + states[:, HEIGHT] / 2
-    share = 1.0 if weights is None else weights / weights.max()
-    axes.scatter(x, y, s=5 + 40 * np.asarray(share), c='white', lw=0)
-    axes.scatter(x, y, s=2 + 26 * np.asarray(share), c=GIVEN, lw=0, label='particles')
+    share = np.full(len(x), 0.2) if weights is None else weights / weights.max()
+    axes.scatter(
+        x, y, s=2 + 24 * share, c=GIVEN, lw=0.3, edgecolors='white', alpha=0.8, label='particles'
+    )
 
 
 def _box(state: Array) -> Box:
@@ -83,6 +86,12 @@ def _initial(first: Moment) -> Picture:
         r's = \{x, y, \dot{x}, \dot{y}, H_x, H_y, \alpha\}',
         (name_of(ParticleFilter.initialise),), plot_style.png(figure),
         {'states': states, 'box': box.as_tuple()},
+        signs(
+            ('s', 'a particle'), ('x,\\ y', 'its place: the corner of its box, pixels'),
+            (r'\dot{x},\ \dot{y}', 'its velocity, pixels a second'),
+            ('H_x,\\ H_y', 'width and height of its box, pixels'),
+            (r'\alpha', 'by how much its box grows each second'),
+        ),
     )  # fmt: skip
 
 
@@ -115,7 +124,8 @@ def _steps(asked: Moment) -> Picture:
         '5.2', 'particles_steps', 'Spread, weighted, resampled',
         'Each particle moves on by its own velocity and some chance; then it is the heavier (the '
         'larger dot), the more the colours in its box are those of the target. The weighted mean '
-        'is the estimate (box), and when few particles carry all the weight the light ones are '
+        'is the estimate (box), and when few particles carry nearly all the weight (an effective '
+        f'number below {100 * RgbdPfParameters().resample_below:.0f} %) the light ones are '
         'replaced by copies of the heavy ones.',
         r'w_i \propto w_i \cdot \frac{1}{\sqrt{2\pi}\,\sigma}\exp\left(-\frac{d_i^2}{2\sigma^2}'
         r'\right),\quad s_E = \sum_i w_i s_i',
@@ -131,6 +141,13 @@ def _steps(asked: Moment) -> Picture:
             'spread': spread['states'], 'weights': weights, 'resampled': after,
             'estimate': mean.as_tuple(),
         },
+        signs(
+            ('w_i', 'the weight of particle i; all together are 1'),
+            (r'\propto', 'but for a factor, which makes them so'),
+            ('d_i', 'how unlike the colours in its box are to the target\'s: see the next picture'),
+            (r'\sigma', f'{RgbdPfParameters().color_sigma:g}: how fast weight falls off with that'),
+            ('s_i', 'the particle'), ('s_E', 'the estimate: the weighted mean'),
+        ),
     )  # fmt: skip
 
 
@@ -191,4 +208,8 @@ def _histogram(moments: ParticleMoments) -> Picture:
         f'counting more; {bins} bins a channel, {bins**3} in all, drawn by channel.{words}',
         r'd(p, q) = \sqrt{1 - \sum_u \sqrt{p_u q_u}}',
         (histogram, name_of(bhattacharyya_distance)), plot_style.png(figure), values,
+        signs(
+            ('d', 'the Bhattacharyya distance: 0 for the same colours, 1 for none in common'),
+            ('p,\\ q', 'two histograms: shares of the pixels'), ('u', 'a bin of colour'),
+        ),
     )  # fmt: skip

@@ -24,7 +24,26 @@ Array = npt.NDArray[Any]
 
 SEEN, GIVEN, OTHER = plot_style.PALETTE[0], plot_style.PALETTE[1], plot_style.PALETTE[4]
 """Colours of what the tracker found, what it was given, and what it looked at besides."""
-_MOST_MESH = 60
+_MOST_MESH = 100
+"""Cells of a surface drawn in perspective; of larger ones the highest of some neighbours."""
+
+SIGNS = {
+    'F': (r'F^{-1}', 'the inverse Fourier transform: from frequencies back to places'),
+    'hat': (r'\hat{x}', 'the Fourier transform of x, so its share of each frequency'),
+    'star': (r'\hat{x}^*', 'the same with the sign of its imaginary part turned'),
+    'times': (r'\odot', 'entry by entry multiplied'),
+    'x': ('x', 'the features that the filter has learned'),
+    'z': ('z', 'the features of the window that is looked at'),
+    'k': (r'k^{xz}', 'the likeness of z, at every shift, to x: 0 to 1, 1 is the same'),
+    'alpha': (r'\hat{\alpha}', "the filter's coefficients, one for each frequency"),
+    'f': ('f(z)', 'the response: the answer for each shift of the window'),
+}
+"""Signs that more than one equation has."""
+
+
+def signs(*names: str | tuple[str, str]) -> tuple[tuple[str, str], ...]:
+    """Signs by their names in :data:`SIGNS`, others as they are."""
+    return tuple(SIGNS[name] if isinstance(name, str) else name for name in names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +59,7 @@ class Picture:
         functions: that computed it, as :func:`~rgbd_kcf_tracker.view.watch.name_of` writes them.
         png: the picture.
         values: the arrays and numbers shown, by name.
+        signs: each sign of the equation, in mathtext, and what it stands for.
     """
 
     figure: str
@@ -50,6 +70,7 @@ class Picture:
     functions: tuple[str, ...]
     png: bytes = field(repr=False)
     values: Mapping[str, Any] = field(repr=False)
+    signs: tuple[tuple[str, str], ...] = ()
 
 
 def rgb(frame: Frame) -> Array:
@@ -94,6 +115,8 @@ def show_heat(
     bar.ax.tick_params(labelsize=7)
     axes.set_title(title, fontsize=9)
     axes.tick_params(labelsize=7)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, integer=True))
 
 
 def show_mesh(
@@ -103,7 +126,9 @@ def show_mesh(
     """Values as a surface over the plane, as the thesis draws them; y grows downwards."""
     axes: Any = figure.add_subplot(*place, projection='3d')
     step = max(1, int(np.ceil(max(values.shape) / _MOST_MESH)))
-    thin = np.nan_to_num(np.asarray(values, float))[::step, ::step]
+    whole = np.nan_to_num(np.asarray(values, float))
+    edges = [range(0, side, step) for side in whole.shape]
+    thin = np.maximum.reduceat(np.maximum.reduceat(whole, edges[0], axis=0), edges[1], axis=1)
     rows, cols = thin.shape
     y, x = np.mgrid[:rows, :cols] * step
     top = high if high is not None else float(max(thin.max(), 1e-6))

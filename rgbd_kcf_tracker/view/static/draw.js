@@ -7,6 +7,8 @@
 const PALETTE = ['#56b4e9', '#e69f00', '#cc79a7', '#009e73', '#d55e00', '#0072b2', '#f0e442', '#999999'];
 const STATES = ['tracking', 'occluded', 'lost', 'idle'];
 const TRAIL_S = 10;
+const MOST_BANDS = 6;
+const STAGE_TINTS = ['#9aa5b1', '#3d7fb8', '#cc79a7', '#e69f00', '#5a6570'];
 
 function theme(name) {
   return getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
@@ -30,7 +32,7 @@ function fitted(canvas) {
 }
 
 /** The picture and, in its own pixels, what is drawn on it. */
-function drawPicture(canvas, bitmap, shown, drag) {
+function drawPicture(canvas, bitmap, shown, trails, drag) {
   const [width, height] = shown.size;
   if (canvas.width !== width || canvas.height !== height) {
     canvas.width = width;
@@ -39,35 +41,65 @@ function drawPicture(canvas, bitmap, shown, drag) {
   const g = canvas.getContext('2d');
   if (bitmap) g.drawImage(bitmap, 0, 0, width, height);
   const unit = width / Math.max(1, canvas.clientWidth);  // image pixels to one of the screen
+  const [fx, fy, cx, cy] = shown.camera;
+  const seenAt = ([x, y, z]) => z > 0.1 ? [fx * x / z + cx, fy * y / z + cy] : null;
   if (shown.truth) outline(g, shown.truth, '#ffffff', 1 * unit, [5 * unit, 4 * unit]);
   for (const target of shown.targets) {
+    if (target.chosen) path(g, (trails.get(target.id) || []).map(seenAt), colorOf(target.id), 1.5 * unit);
+    if (target.ellipse) path(g, rim(target.ellipse).map(seenAt), colorOf(target.id), 1.5 * unit);
     for (const [x, y, weight] of target.pixels || []) {
       g.fillStyle = colorOf(target.id);
       g.globalAlpha = 0.25 + 0.65 * weight;
       g.fillRect(x - unit, y - unit, 2 * unit, 2 * unit);
     }
-    const [fx, fy, cx, cy] = shown.camera;
     for (const [x, y, z, weight] of target.particles || []) {
-      if (z < 0.1) continue;
+      const at = seenAt([x, y, z]);
+      if (!at) continue;
       g.fillStyle = colorOf(target.id);
       g.globalAlpha = 0.25 + 0.65 * weight;
-      g.fillRect(fx * x / z + cx - 1.5 * unit, fy * y / z + cy - 1.5 * unit, 3 * unit, 3 * unit);
+      g.fillRect(at[0] - 1.5 * unit, at[1] - 1.5 * unit, 3 * unit, 3 * unit);
     }
     g.globalAlpha = 1;
+    if (!target.box && target.predicted) {
+      const at = seenAt(target.predicted);
+      if (at) label(g, `${target.name}, hidden`, [at[0], at[1] + 17 * unit], colorOf(target.id), unit);
+    }
     for (const other of (target.considered || []).slice(0, 6)) {
       if (!target.box || distance(other.box, target.box) > 4)
         outline(g, other.box, '#dddddd', 1 * unit, [3 * unit, 3 * unit]);
     }
     if (target.box) {
-      outline(g, target.box, colorOf(target.id), 2.5 * unit, []);
+      outline(g, target.box, colorOf(target.id), (target.chosen ? 2.5 : 1.2) * unit, []);
       caption(g, target, unit, width);
     }
   }
   if (drag) outline(g, drag, '#ffffff', 2 * unit, [6 * unit, 4 * unit]);
 }
 
+/** The border of the ellipse on the floor plan that holds 95 % of where somebody may be. */
+function rim([x, z, major, minor, angle, level]) {
+  return Array.from({length: 37}, (_, i) => {
+    const a = i / 18 * Math.PI, p = major * Math.cos(a), q = minor * Math.sin(a);
+    return [x + p * Math.cos(angle) - q * Math.sin(angle), level, z + p * Math.sin(angle) + q * Math.cos(angle)];
+  });
+}
+
+function path(g, places, color, thickness) {
+  g.strokeStyle = color;
+  g.lineWidth = thickness;
+  g.beginPath();
+  places.forEach((at, i) => { if (at) g[i && places[i - 1] ? 'lineTo' : 'moveTo'](...at); });
+  g.stroke();
+}
+
 function distance(a, b) {
   return Math.max(...a.map((value, i) => Math.abs(value - b[i])));
+}
+
+/** Common area of two boxes against that of either. */
+function overlap([ax, ay, aw, ah], [bx, by, bw, bh]) {
+  const wide = Math.min(ax + aw, bx + bw) - Math.max(ax, bx), high = Math.min(ay + ah, by + bh) - Math.max(ay, by);
+  return wide > 0 && high > 0 ? wide * high / (aw * ah + bw * bh - wide * high) : 0;
 }
 
 function outline(g, [x, y, width, height], color, thickness, dash) {
@@ -87,7 +119,7 @@ function caption(g, target, unit, imageWidth) {
   let words = target.name;
   if (target.score !== null) words += `  ${Math.round(100 * target.score)} %`;
   if (target.depth !== null) words += `  ${target.depth.toFixed(2)} m`;
-  const size = 12 * unit;
+  const size = (target.chosen ? 12 : 10.5) * unit;
   g.font = `600 ${size}px system-ui, sans-serif`;
   const width = g.measureText(words).width + 10 * unit;
   const left = Math.max(0, Math.min(x, imageWidth - width));
@@ -167,8 +199,10 @@ function drawAbove(canvas, shown, points, trails) {
     g.strokeStyle = color;
     g.lineWidth = 2;
     g.beginPath();
-    trail.forEach(({place}, i) => g[i ? 'lineTo' : 'moveTo'](...at(place[0], place[2])));
+    trail.forEach((place, i) => g[i ? 'lineTo' : 'moveTo'](...at(place[0], place[2])));
+    g.lineWidth = target.chosen ? 2 : 1;
     g.stroke();
+    g.lineWidth = 2;
     g.fillStyle = color;
     for (const [x, , z, weight] of target.particles || []) {
       const [u, v] = at(x, z);
@@ -186,30 +220,33 @@ function drawAbove(canvas, shown, points, trails) {
     }
     if (target.position) {
       const [u, v] = at(target.position[0], target.position[2]);
-      g.beginPath(); g.arc(u, v, 6, 0, 2 * Math.PI); g.fill();
+      g.beginPath(); g.arc(u, v, target.chosen ? 6 : 4, 0, 2 * Math.PI); g.fill();
       g.strokeStyle = theme('card'); g.lineWidth = 1.5; g.stroke();
       label(g, target.name, [u, v - 4], color);
     }
   }
 }
 
-function label(g, words, [u, v], color) {
-  g.font = '600 11px system-ui, sans-serif';
+function label(g, words, [u, v], color, unit = 1) {
+  g.font = `600 ${11 * unit}px system-ui, sans-serif`;
   g.textAlign = 'center';
-  const width = g.measureText(words).width + 8;
+  g.textBaseline = 'middle';
+  const width = g.measureText(words).width + 8 * unit;
   g.fillStyle = color;
-  g.fillRect(u - width / 2, v - 24, width, 15);
+  g.fillRect(u - width / 2, v - 24 * unit, width, 15 * unit);
   g.fillStyle = '#10151a';
-  g.fillText(words, u, v - 16);
+  g.fillText(words, u, v - 16 * unit);
+  g.textAlign = 'left';
 }
 
 /** State, score, confusion and latency of the last minute. Returns where each entry lies. */
-function drawTime(canvas, entries, now) {
+function drawTime(canvas, entries, now, {names, chosen, stages}) {
   const [g, width, height] = fitted(canvas);
   g.fillStyle = theme('card');
   g.fillRect(0, 0, width, height);
-  const left = 46, right = width - 8, top = 6;
-  const ids = [...new Set(entries.flatMap(e => e.targets.map(t => t[0])))].slice(0, 6);
+  const left = 76, right = width - 8, top = 6;
+  const everyone = [...new Set(entries.flatMap(e => e.targets.map(t => t[0])))];
+  const ids = everyone.sort((a, b) => chosen.has(b) - chosen.has(a) || a - b).slice(0, MOST_BANDS);
   const bandHeight = 12;
   const scoreTop = top + Math.max(1, ids.length) * (bandHeight + 3) + 6;
   const scoreBottom = scoreTop + (height - scoreTop - 22) * 0.6;
@@ -227,7 +264,7 @@ function drawTime(canvas, entries, now) {
   };
   ids.forEach((id, row) => {
     const y = top + row * (bandHeight + 3);
-    words(`${id}`, left - 6, y + bandHeight / 2);
+    words(shortened(g, names.get(id) || `person ${id}`, left - 12), left - 7, y + bandHeight / 2);
     g.fillStyle = colorOf(id);
     g.fillRect(left - 4, y, 3, bandHeight);
     for (let i = 0; i < entries.length; i++) {
@@ -248,24 +285,30 @@ function drawTime(canvas, entries, now) {
     words(value ? `${100 * value} %` : 'score', left - 6, y);
   }
   for (const id of ids) {
-    line(g, entries, e => (e.targets.find(t => t[0] === id) || [])[2], colorOf(id), 1.8, [], x, scoreTop, scoreBottom, 1);
-    line(g, entries, e => (e.targets.find(t => t[0] === id) || [])[3] || undefined, theme('lost'), 1.4, [3, 3], x, scoreTop, scoreBottom, 1);
+    const curve = (index, color, thickness, dash) => line(g, entries, e => (e.targets.find(t => t[0] === id) || [])[index],
+      color, thickness, dash, x, scoreTop, scoreBottom, 1);
+    curve(2, colorOf(id), chosen.has(id) ? 1.8 : 1, []);
+    curve(3, theme('lost'), 1.4, [4, 3]);
+    curve(5, theme('quiet'), 1.6, [1, 3]);
   }
-  const stages = ['read', 'track', 'show'];
   const sums = entries.map(e => stages.reduce((sum, s) => sum + (e[s] || 0), 0)).sort((a, b) => a - b);
   // A single hiccup must not flatten all the rest.
   const most = Math.max(5, 1.2 * (sums[Math.floor(0.97 * (sums.length - 1))] || 0));
   words(`${Math.ceil(most)} ms`, left - 6, costTop + 4);
   words('0', left - 6, costBottom);
-  const tints = [theme('line'), theme('accent'), theme('idle')];
+  const gap = entries.length > 1 ? (x(end) - x(entries[0].t)) / (entries.length - 1) : 2;
   for (const entry of entries) {
     let base = costBottom;
     stages.forEach((stage, i) => {
       const size = Math.min((entry[stage] || 0) / most * (costBottom - costTop), base - costTop);
-      g.fillStyle = tints[i];
-      g.fillRect(x(entry.t), base - size, Math.max(1, (right - left) / 600), size);
+      g.fillStyle = STAGE_TINTS[i % STAGE_TINTS.length];
+      g.fillRect(x(entry.t), base - size, Math.max(1, Math.min(6, gap - (gap > 3))), size);
       base -= size;
     });
+    if (entry.dropped) {
+      g.fillStyle = theme('lost');
+      g.beginPath(); g.moveTo(x(entry.t), costBottom - 7); g.lineTo(x(entry.t) - 4, costBottom); g.lineTo(x(entry.t) + 4, costBottom); g.fill();
+    }
   }
   words(`${start.toFixed(0)} s`, left, height - 8, 'left');
   words(`${stop.toFixed(1)} s`, right, height - 8, 'right');
@@ -277,6 +320,13 @@ function drawTime(canvas, entries, now) {
   return {time: u => start + (u - left) / (right - left) * (stop - start)};
 }
 
+function shortened(g, words, width) {
+  if (g.measureText(words).width <= width) return words;
+  let kept = words;
+  while (kept.length > 1 && g.measureText(kept + '…').width > width) kept = kept.slice(0, -1);
+  return kept + '…';
+}
+
 function line(g, entries, value, color, thickness, dash, x, top, bottom, most) {
   g.strokeStyle = color;
   g.lineWidth = thickness;
@@ -286,6 +336,7 @@ function line(g, entries, value, color, thickness, dash, x, top, bottom, most) {
   for (const entry of entries) {
     const v = value(entry);
     if (v === undefined || v === null) { drawing = false; continue; }
+    if (v === 0 && dash.length) { drawing = false; continue; }
     g[drawing ? 'lineTo' : 'moveTo'](x(entry.t), bottom - Math.min(v / most, 1) * (bottom - top));
     drawing = true;
   }

@@ -5,10 +5,11 @@
 'use strict';
 
 const $ = id => document.getElementById(id);
+const STATE_WORDS = {tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'no target'};
 const stored = $('stored');
 const page = {
   hello: null, shown: null, entries: [], trails: new Map(), points: null, bitmaps: {}, drag: null,
-  socket: null, wait: 500, views: new Map(), settings: '', timeAxis: null, drawn: 0, word: 0, moment: 0,
+  socket: null, wait: 500, views: new Map(), names: new Map(), why: 0, settings: '', timeAxis: null, drawn: 0, word: 0, moment: 0,
 };
 const room = new Room($('room'), $('labels'), stored ? null : (x, y) => send({do: 'point', x, y, frame: currentFrame()}));
 
@@ -44,16 +45,11 @@ async function show(buffer) {
   for (const old of Object.values(page.bitmaps)) if (old) old.close();
   page.bitmaps = {color, depth};
   page.points = pointsOf(blob('points'));
-  if (shown.anew) { page.entries = []; page.trails.clear(); }
+  if (shown.anew) page.entries = [];
   page.entries.push(...shown.entries);
   const last = page.entries.length ? page.entries[page.entries.length - 1].t : 0;
   page.entries = page.entries.filter(e => e.t >= last - 60);
   page.shown = shown;
-  for (const target of shown.targets) {
-    const trail = page.trails.get(target.id) || [];
-    if (target.position) trail.push({t: shown.time, place: target.position});
-    page.trails.set(target.id, trail.filter(p => p.t > shown.time - TRAIL_S && p.t <= shown.time));
-  }
   showViews(shown, blob);
   redraw();
   page.drawn += 1;
@@ -62,11 +58,16 @@ async function show(buffer) {
 function redraw() {
   const shown = page.shown;
   if (!shown) return;
-  drawPicture($('picture'), page.bitmaps.color, shown, page.drag);
+  page.trails = trailsOf(page.entries, shown.time);
+  drawPicture($('picture'), page.bitmaps.color, shown, page.trails, page.drag);
   drawDepth($('depth'), page.bitmaps.depth, shown);
   $('far').textContent = shown.far ? `dark 0 m, bright ${shown.far} m` : '';
   drawAbove($('above'), shown, page.points, page.trails);
-  page.timeAxis = drawTime($('time'), page.entries, shown.time);
+  for (const target of shown.targets) page.names.set(target.id, target.name);
+  page.timeAxis = drawTime($('time'), page.entries, shown.time, {
+    names: page.names, chosen: new Set(shown.targets.filter(t => t.chosen).map(t => t.id)),
+    stages: page.hello ? page.hello.stages : [],
+  });
   room.show(shown, page.points, page.trails);
   showWords(shown);
   showTargets(shown);
@@ -74,11 +75,27 @@ function redraw() {
   showSettings(shown);
 }
 
+/** Where each was in the last seconds, by id. */
+function trailsOf(entries, now) {
+  const trails = new Map();
+  for (const entry of entries) {
+    if (entry.t <= now - TRAIL_S || entry.t > now + 1e-3) continue;
+    for (const [id, , , , , , place] of entry.targets) {
+      if (!place) continue;
+      if (!trails.has(id)) trails.set(id, []);
+      trails.get(id).push(place);
+    }
+  }
+  return trails;
+}
+
 function showWords(shown) {
-  const states = shown.targets.map(t => t.state);
+  const chosen = shown.targets.filter(t => t.chosen), others = shown.targets.length - chosen.length;
+  const states = chosen.map(t => t.state);
   const worst = ['lost', 'occluded', 'tracking'].find(s => states.includes(s)) || 'idle';
   $('state').dataset.state = worst;
-  $('state').textContent = {tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'no target'}[worst];
+  const some = chosen.length > 1 ? `${states.filter(s => s === worst).length} of ${states.length} ` : '';
+  $('state').textContent = some + STATE_WORDS[worst] + (others ? `, ${others} ${others === 1 ? 'other' : 'others'}` : '');
   const recent = page.entries.slice(-30);
   const mean = name => recent.reduce((sum, e) => sum + (e[name] || 0), 0) / Math.max(1, recent.length);
   const facts = [];
@@ -87,6 +104,7 @@ function showWords(shown) {
     if (span > 0) facts.push(`${((recent.length - 1) / span).toFixed(1)} frames/s`);
   }
   if (mean('track')) facts.push(`tracking ${mean('track').toFixed(1)} ms`);
+  showMoment(shown);
   if (shown.latency) facts.push(`latency ${shown.latency} ms`);
   if (shown.dropped !== undefined) facts.push(`${shown.dropped} pairs dropped`);
   if (shown.guessed && shown.blobs.points) facts.push('camera unknown: metres are guessed');
@@ -104,6 +122,33 @@ function showWords(shown) {
   }
 }
 
+/** In words, what the last minute says of the moment shown. */
+function showMoment(shown) {
+  const entry = page.entries.find(e => e.frame === shown.frame && Math.abs(e.t - shown.time) < 0.001);
+  const words = [`${shown.time.toFixed(1)} s`];
+  for (const [id, state, score, confused, who] of entry ? entry.targets.filter(t => shown.targets.some(s => s.id === t[0] && s.chosen)).slice(0, 2) : []) {
+    const percent = v => `${Math.round(100 * v)} %`;
+    words.push(`${page.names.get(id)} ${state === 'tracking' && score !== null ? percent(score) : STATE_WORDS[state]}`);
+    if (confused >= 0.01) words.push(`confused with ${who === null ? 'another candidate' : page.names.get(who) || `person ${who}`} ${percent(confused)}`);
+  }
+  $('moment').textContent = words.join(' · ');
+}
+
+function showLegend(stages) {
+  const key = (kind, style, words) => {
+    const item = make('span'), mark = make('i', kind);
+    Object.assign(mark.style, style);
+    item.append(mark, words);
+    return item;
+  };
+  $('legend').replaceChildren(
+    make('span', '', 'bars: tall tracking, half hidden, low lost'),
+    key('line', {}, 'score'), key('line', {borderTopStyle: 'dashed', color: 'var(--lost)'}, 'confused with another'),
+    key('line', {borderTopStyle: 'dotted', color: 'var(--quiet)'}, 'response of the filter'),
+    ...stages.map((stage, i) => key('', {background: STAGE_TINTS[i]}, `${stage} (ms)`)),
+    ...(page.hello.live ? [make('span', '', '▲ pairs dropped')] : []));
+}
+
 function say(words, milliseconds) {
   $('banner').textContent = words;
   $('banner').hidden = false;
@@ -119,10 +164,20 @@ function make(tag, className, words) {
 }
 
 function showTargets(shown) {
-  $('no-targets').hidden = shown.targets.length > 0;
-  const list = $('targets');
+  const chosen = shown.targets.filter(t => t.chosen);
+  $('no-targets').hidden = chosen.length > 0;
+  showPeople($('targets'), chosen);
+  showPeople($('others'), shown.targets.filter(t => !t.chosen));
+  const variant = page.hello && page.hello.variants.find(v => v.name === shown.variant);
+  $('everyone-row').hidden = shown.everyone === undefined || !variant;
+  $('everyone').disabled = !variant || !variant.everyone;
+  $('everyone-row').title = $('everyone').disabled ? 'only metric can' : '';
+  $('everyone').checked = Boolean(shown.everyone);
+}
+
+function showPeople(list, people) {
   const known = new Map([...list.children].map(li => [Number(li.dataset.id), li]));
-  for (const target of shown.targets) {
+  for (const target of people) {
     let item = known.get(target.id);
     known.delete(target.id);
     if (!item) {
@@ -133,26 +188,35 @@ function showTargets(shown) {
       name.setAttribute('aria-label', 'name');
       name.readOnly = Boolean(stored) || !page.hello.several;
       name.addEventListener('change', () => send({do: 'rename', id: target.id, name: name.value}));
-      const remove = make('button', 'only-online', 'Remove');
-      remove.type = 'button';
-      remove.addEventListener('click', () => send({do: 'remove', id: target.id}));
-      item.append(make('span', 'dot'), name, remove, make('span', 'facts'), make('div', 'views'));
+      const button = make('button', 'only-online', target.chosen ? 'Remove' : 'Follow');
+      button.type = 'button';
+      button.addEventListener('click', () => send(target.chosen ? {do: 'remove', id: target.id} : {do: 'follow', id: target.id, frame: currentFrame()}));
+      item.append(make('span', 'dot'), name, button, make('span', 'facts'), make('div', 'views'));
       list.append(item);
     }
-    const [dot, name, , facts] = item.children;
+    const [dot, name, button, facts] = item.children;
+    button.disabled = !target.chosen && !target.box;
     dot.dataset.state = target.state;
     dot.style.outline = `3px solid ${colorOf(target.id)}`;
     if (document.activeElement !== name) name.value = target.name;
-    const words = [{tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'idle'}[target.state]];
+    const words = [STATE_WORDS[target.state]];
     if (target.box && target.score !== null) words.push(`score ${target.score.toFixed(2)}`);
     if (target.depth !== null) words.push(`${target.depth.toFixed(2)} m`);
-    if (target.speed !== undefined) words.push(`${target.speed.toFixed(1)} m/s`);
+    if (target.speed !== undefined) words.push(`${target.speed.toFixed(1)}\u00a0m/s`);
     facts.textContent = words.join(' · ');
     const views = item.children[4];
     const urls = page.views.get(target.id) || [];
-    if (views.dataset.urls !== urls.join()) {
-      views.dataset.urls = urls.join();
-      views.replaceChildren(...urls.map(url => { const image = make('img'); image.src = url; image.alt = `a view of ${target.name}`; return image; }));
+    const colors = target.colors || urls.map(() => []);
+    if (views.dataset.shows !== urls.join() + colors.join()) {
+      views.dataset.shows = urls.join() + colors.join();
+      views.replaceChildren(...colors.map((slices, i) => {
+        const view = make('span'), strip = make('b');
+        view.title = slices.length ? 'a view that the tracker keeps, and the mean colours that it compares, from head to feet' : 'the first sight';
+        strip.append(...slices.map(color => { const cell = make('i'); cell.style.background = color; return cell; }));
+        if (urls[i]) { const image = make('img'); image.src = urls[i]; image.alt = `a view of ${target.name}`; view.append(image); }
+        if (slices.length) view.append(strip);
+        return view;
+      }));
     }
   }
   for (const gone of known.values()) gone.remove();
@@ -162,29 +226,40 @@ function showViews(shown, blob) {
   const found = new Map();
   for (const name of Object.keys(shown.blobs)) {
     const match = /^view_(\d+)_(\d+)$/.exec(name);
-    if (match) found.set(Number(match[1]), [...(found.get(Number(match[1])) || []), name]);
+    if (!match) continue;
+    const id = Number(match[1]);
+    if (!found.has(id)) found.set(id, []);
+    found.get(id)[Number(match[2])] = name;
   }
   for (const [id, names] of found) {
-    const sizes = names.map(name => shown.blobs[name][1]).join();
+    // Of two pictures of the same length one byte or another differs: the sum tells.
+    const digest = names.map(name => blob(name).reduce((sum, byte) => (sum * 31 + byte) % 1000003, 7)).join();
     const before = page.views.get(id);
-    if (before && before.sizes === sizes) continue;
-    for (const url of before || []) URL.revokeObjectURL(url);
+    if (before && before.digest === digest) continue;
+    for (const url of before || []) if (url) URL.revokeObjectURL(url);
     const urls = names.map(name => URL.createObjectURL(new Blob([blob(name)], {type: 'image/jpeg'})));
-    urls.sizes = sizes;
+    urls.digest = digest;
     page.views.set(id, urls);
   }
 }
 
 function showWhy(shown) {
-  const target = shown.targets.find(t => t.considered && t.considered.length);
+  const weighed = shown.targets.filter(t => t.considered && t.considered.length);
+  const target = weighed.find(t => t.id === page.why) || weighed[0];
   $('no-why').hidden = Boolean(target);
-  $('why-of').textContent = target ? target.name : '';
-  const cards = (target ? target.considered : []).slice(0, 4).map((candidate, index) => {
-    const card = make('div', 'candidate');
+  $('why-of').hidden = !target;
+  if (target && document.activeElement !== $('why-of')) {
+    $('why-of').replaceChildren(...weighed.map(t => { const option = make('option', '', t.name); option.value = t.id; return option; }));
+    $('why-of').value = target.id;
+  }
+  const cards = (target ? target.considered : []).map(candidate => {
+    const card = make('div', 'candidate'), head = make('p');
     const odds = Object.values(candidate.cues).reduce((sum, v) => sum + v, 0);
-    const first = index === 0 && target.box;
-    card.append(make('b', '', `${Math.round(100 * candidate.probability)} %`), make('span', 'quiet',
-      `  ${first ? 'taken' : 'not taken'}, log-odds ${odds >= 0 ? '+' : '−'}${Math.abs(odds).toFixed(1)}, at ${candidate.box.map(v => Math.round(v)).join(', ')}`));
+    const taken = target.box && distance(candidate.box, target.box) < 1;
+    const other = taken ? null : shown.targets.find(t => t !== target && t.box && overlap(t.box, candidate.box) > 0.5);
+    head.append(make('b', '', `${Math.round(100 * candidate.probability)} %`), make('span', 'quiet',
+      `  ${taken ? 'taken' : 'not taken'}${other ? ` (${other.name})` : ''}, log-odds ${odds >= 0 ? '+' : '−'}${Math.abs(odds).toFixed(1)}, at ${candidate.box.map(v => Math.round(v)).join(', ')}`));
+    card.append(head);
     for (const [name, value] of Object.entries(candidate.cues)) {
       if (Math.abs(value) < 0.05) continue;
       const row = make('div', 'cue');
@@ -256,7 +331,7 @@ function greet(hello) {
   if (hello.live) $('no-why').textContent = 'The topics of a running tracker carry no candidates: record a bag and open it with rgbd-kcf view.';
   $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
   $('variant').disabled = Boolean(stored);
-  $('legend').textContent = 'score (line), confused with another (dashed); time to read, track and show';
+  showLegend(hello.stages);
   page.settings = '';
 }
 
@@ -291,7 +366,7 @@ function listenForPicking() {
     if (!from) return;
     const [x, y] = placeIn(event);
     page.drag = [Math.min(x, from[0]), Math.min(y, from[1]), Math.abs(x - from[0]), Math.abs(y - from[1])];
-    drawPicture(picture, page.bitmaps.color, page.shown, page.drag);
+    drawPicture(picture, page.bitmaps.color, page.shown, page.trails, page.drag);
   });
   picture.addEventListener('pointerup', event => {
     if (!from) return;
@@ -380,7 +455,6 @@ function replay() {
     run.index = page.moment = Math.max(0, Math.min(index, unpacked.length - 1));
     const past = heads.slice(0, run.index).flatMap(h => h.entries);
     page.entries = [...past];
-    if (run.index === 0 || run.jump) page.trails.clear();
     await show(unpacked[run.index]);
     page.entries = [...past, ...heads[run.index].entries].filter(e => e.t >= heads[run.index].time - 60);
     Object.assign(page.shown, {playing: run.playing, speed: run.speed});
@@ -397,11 +471,9 @@ function replay() {
   const frames = heads.map(h => h.frame);
   listenForPlaying(async message => {
     clearTimeout(run.timer);
-    run.jump = true;
     if (message.do === 'play') {
       run.playing = true;
       if (run.index >= unpacked.length - 1) run.index = -1;
-      run.jump = false;
       await next();
       return;
     }
@@ -414,13 +486,13 @@ function replay() {
     }
     if (message.do === 'speed') run.speed = message.value;
     await put(run.index);
-    run.jump = false;
     if (run.playing) next();
   });
   put(0);
 }
 
 $('home').addEventListener('click', () => room.home());
+$('why-of').addEventListener('change', () => { page.why = Number($('why-of').value); $('why-of').blur(); redraw(); });
 window.addEventListener('resize', redraw);
 matchMedia('(prefers-color-scheme: dark)').addEventListener('change', redraw);
 if (stored) {
@@ -430,5 +502,6 @@ if (stored) {
   listenForPlaying(send);
   $('variant').addEventListener('change', () => { send({do: 'variant', name: $('variant').value}); $('variant').blur(); });
   $('defaults').addEventListener('click', () => send({do: 'defaults'}));
+  $('everyone').addEventListener('change', () => send({do: 'everyone', value: $('everyone').checked}));
   connect();
 }

@@ -228,8 +228,8 @@ class Room {
       for (let z = 0; z <= 8; z++) add(onFloor(-4, z), onFloor(4, z), faint);
     }
     const corner = (u, v, z = 0.35) => [(u - cx) * z / fx, (v - cy) * z / fy, z];
-    const rim = [corner(0, 0), corner(size[0], 0), corner(size[0], size[1]), corner(0, size[1])];
-    rim.forEach((c, i) => { add([0, 0, 0], c, grey); add(c, rim[(i + 1) % 4], grey); });
+    const frustum = [corner(0, 0), corner(size[0], 0), corner(size[0], size[1]), corner(0, size[1])];
+    frustum.forEach((c, i) => { add([0, 0, 0], c, grey); add(c, frustum[(i + 1) % 4], grey); });
     for (const target of targets) {
       const color = rgb(colorOf(target.id));
       if (target.box && target.depth) {
@@ -244,18 +244,10 @@ class Room {
         }
       }
       const trail = (this.trails && this.trails.get(target.id)) || [];
-      for (let i = 1; i < trail.length; i++) add(trail[i - 1].place, trail[i].place, color);
+      for (let i = 1; i < trail.length; i++) add(trail[i - 1], trail[i], color);
       if (target.ellipse) {
-        const [ex, ez, major, minor, angle] = target.ellipse;
-        const level = target.particles && target.particles.length ? target.particles[0][1] : 0;
-        let last = null;
-        for (let i = 0; i <= 36; i++) {
-          const a = i / 18 * Math.PI;
-          const [p, q] = [major * Math.cos(a), minor * Math.sin(a)];
-          const next = [ex + p * Math.cos(angle) - q * Math.sin(angle), level, ez + p * Math.sin(angle) + q * Math.cos(angle)];
-          if (last) add(last, next, color);
-          last = next;
-        }
+        const border = rim(target.ellipse);
+        for (let i = 1; i < border.length; i++) add(border[i - 1], border[i], color);
       }
     }
     return {places, tints};
@@ -282,7 +274,7 @@ class Room {
       return;
     }
     for (const target of this.shown.targets) {
-      const place = target.position || (target.ellipse && [target.ellipse[0], 0, target.ellipse[1]]);
+      const place = target.position || target.predicted || (target.ellipse && [target.ellipse[0], target.ellipse[5], target.ellipse[1]]);
       const at = place && this.project(m, place, width, height);
       if (at) label(g, target.name, at, colorOf(target.id));
     }

@@ -1,0 +1,101 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who could be followed: those in view of whom it is sure that they are people.
+
+Everyone before the room is accounted for as while following (:class:`MetricTargets`). Who has had a
+person's shape or has walked is chosen once they show whole, and as round as a body is: a cupboard,
+a box that is pushed about or a life-size picture is as tall, but it is flat, fills its outline, or
+never stands before the room. Where that is not sure there is nobody yet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.decide.crowd import Sight
+from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.targets import MetricTargets
+
+SIGHTINGS = 2
+"""Frames in which somebody was seen, at the least."""
+LEAST_TOP = 0.9
+"""Metres of the head above the floor, at the least: a dog's is lower."""
+LEAST_HEIGHT = 0.55
+"""Metres that show, at the least: head to hips."""
+ASPECT = 1.15
+"""Height against width, at the least."""
+FILL = (0.3, 0.8)
+"""Share of the box that a body fills; a box or a cupboard fills more, a rack less."""
+RELIEF, RELIEF_PER_SQUARE_METRE = 0.01, 0.001
+"""Metres by which a body's surface lies off a plane, in the median of its pixels: twice what a
+pushed box shows, and beyond the noise of a structured-light camera, of which two thirds of a
+deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
+FITS, PIXELS, OUTLIER = 3, 600, 4.0
+"""Rounds of fitting the plane, pixels for it, and medians beyond which one is not fitted to."""
+
+
+class PersonFinder:
+    """Finds people in the frames of one stream, the nearest first.
+
+    Args:
+        near, far: range in metres in which to look.
+    """
+
+    def __init__(self, near: float = 0.5, far: float = 4.5) -> None:
+        self._near, self._far = near, far
+        self._targets = MetricTargets(MetricParameters())
+        self._targets.everyone = True
+
+    def nearest(self, frame: Frame) -> Box | None:
+        """The nearest person in the next frame, None where nobody is surely one."""
+        self._targets.update(frame)
+        account = self._targets.account
+        if account is None:
+            return None
+        found: list[Sight] = []
+        for sight, owner in zip(account.sights, account.owner, strict=True):
+            if owner < 0 or not self._near < sight.figure.seen.depth < self._far:
+                continue
+            person = account.people[owner]
+            sure = person.alive and person.sightings >= SIGHTINGS
+            if sure and whole(sight) and rounded(account.scene.view, sight.figure.seen):
+                found.append(sight)
+        if not found:
+            return None
+        nearest = min(found, key=lambda s: s.figure.seen.depth).figure.seen
+        return outline_box(account.scene, nearest).clipped(frame.width, frame.height)
+
+
+def whole(sight: Sight) -> bool:
+    """Whether a sight shows somebody from head to hips and from side to side."""
+    seen, top = sight.figure.seen, sight.figure.top
+    if sight.figure.parted or seen.cut.left or seen.cut.top or seen.cut.right:
+        return False
+    if seen.height < max(LEAST_HEIGHT, ASPECT * seen.width):
+        return False
+    if top is not None and top < LEAST_TOP:
+        return False
+    return FILL[0] < seen.area / (seen.width * seen.height) < FILL[1]
+
+
+def rounded(view: DepthView, seen: Silhouette) -> bool:
+    """Whether a silhouette's surface is no plane, as a body's is not and a picture's is."""
+    rows, cols = np.nonzero(seen.mask)
+    some = slice(None, None, max(1, len(rows) // PIXELS))
+    rows, cols = rows[some], cols[some]
+    z = view.depth[seen.rows, seen.cols][rows, cols].astype(np.float64)
+    pixels = np.stack((cols, rows, np.ones(len(z))), axis=1)
+    fitted = np.ones(len(z), np.bool_)
+    off = z
+    for _ in range(FITS):
+        # Along a plane the inverse of depth is affine in the pixel; weighted, to fit in metres.
+        plane, *_ = np.linalg.lstsq(pixels[fitted] * z[fitted, None], np.ones(fitted.sum()))
+        off = np.abs(1 - z * (pixels @ plane)) * z
+        fitted = off <= OUTLIER * np.median(off)
+    return bool(np.median(off) > RELIEF + RELIEF_PER_SQUARE_METRE * seen.depth**2)

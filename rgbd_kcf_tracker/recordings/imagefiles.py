@@ -1,0 +1,123 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Frames from image files: numbered pictures in a folder, and depth of the same names beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import ImageError, RecordingError
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, cannot_read, read_file
+from rgbd_kcf_tracker.recordings.images import (
+    DepthImage,
+    EncodingError,
+    decode_color_bytes,
+    decode_depth_bytes,
+)
+from rgbd_kcf_tracker.recordings.textfiles import natural_key
+
+IMAGE_SUFFIXES = frozenset({'.png', '.jpg', '.jpeg', '.tif', '.tiff'})
+
+
+def image_files(folder: Path) -> tuple[Path, ...]:
+    """The images in a folder in the order of their numbers.
+
+    Raises:
+        RecordingError: where the folder cannot be read or holds no image.
+    """
+    try:
+        found = [p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
+    except OSError as error:
+        raise RecordingError(cannot_read(folder, error)) from None
+    if not found:
+        raise RecordingError(f'{folder} holds no images (PNG, JPEG or TIFF)')
+    return tuple(sorted(found, key=lambda p: natural_key(p.name)))
+
+
+def depths_beside(colors: Iterable[Path], folder: Path) -> tuple[Path | None, ...]:
+    """The depth image of each colour image, which has its name but for the suffix; None: none.
+
+    Raises:
+        RecordingError: as :func:`image_files`.
+    """
+    by_stem = {path.stem: path for path in image_files(folder)}
+    return tuple(by_stem.get(path.stem) for path in colors)
+
+
+def even_stamps(count: int, fps: float) -> tuple[int, ...]:
+    """Stamps in nanoseconds of ``count`` frames at ``fps``, from 0."""
+    return tuple(round(i * 1e9 / fps) for i in range(count))
+
+
+def metres(data: memoryview, max_pixels: int) -> DepthImage:
+    """The depth in an image file as we write it."""
+    return decode_depth_bytes(data, max_pixels=max_pixels)
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFrames:
+    """Frames from image files.
+
+    Attributes:
+        colors: one file per frame.
+        depths: the same, None where a frame has no depth; empty where none has.
+        stamps_ns: one per frame.
+        intrinsics: of the colour camera.
+        max_pixels: of the largest image that is read.
+        read_depth: makes metres of a depth file's bytes, up to so many pixels.
+    """
+
+    colors: tuple[Path, ...]
+    depths: tuple[Path | None, ...]
+    stamps_ns: tuple[int, ...]
+    intrinsics: Intrinsics | None = None
+    max_pixels: int = MAX_PIXELS
+    read_depth: Callable[[memoryview, int], DepthImage] = metres
+
+    def __len__(self) -> int:
+        return len(self.colors)
+
+    def frame(self, index: int, broken: Callable[[str], None] | None = None) -> Frame:
+        """Frame ``index``.
+
+        Args:
+            index: from 0.
+            broken: is told of a depth file that cannot be decoded, and the frame comes without;
+                None: that is an error too.
+
+        Raises:
+            RecordingError: for a file that cannot be read.
+            ImageError: for one that is no image or does not fit, naming it.
+        """
+        color_path = self.colors[index]
+        depth_path = self.depths[index] if self.depths else None
+        color_data = memoryview(read_file(color_path, MAX_IMAGE))
+        try:
+            color = decode_color_bytes(color_data, self.max_pixels)
+        except ImageError as error:
+            raise ImageError(f'{color_path}: {error}') from None
+        depth: DepthImage | None = None
+        try:
+            if depth_path is not None:
+                depth = self._depth(depth_path, broken)
+            return Frame(color, depth, self.stamps_ns[index], self.intrinsics)
+        except ImageError as error:
+            raise ImageError(f'{depth_path or color_path}: {error}') from None
+
+    def _depth(self, path: Path, broken: Callable[[str], None] | None) -> DepthImage | None:
+        data = memoryview(read_file(path, MAX_IMAGE))
+        try:
+            return self.read_depth(data, self.max_pixels)
+        except EncodingError:
+            raise
+        except ImageError as error:
+            if broken is None:
+                raise
+            broken(f'{path}: {error}; the frame is read without depth')
+            return None

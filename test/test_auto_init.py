@@ -1,0 +1,98 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Choosing somebody without being told: people are, furniture and pictures are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker import Frame, Intrinsics
+from rgbd_kcf_tracker.bench import auto_init as bench
+from rgbd_kcf_tracker.live.auto_init import AutoInit
+from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.metric.people import rounded
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+
+SETTINGS = NodeParameters(auto_init=True)
+
+
+@pytest.mark.parametrize('scenario', ['normal', 'crossing', 'turning', 'comers'])
+def test_people_are_chosen(scenario: str) -> None:
+    tally = bench.judge(bench.rendered(scenario, 7, 'people'), SETTINGS)
+    assert tally.choices >= 0.3 * tally.looks > 3
+    assert tally.wrong == 0
+    assert tally.first == 1
+
+
+@pytest.mark.parametrize(
+    ('scenario', 'change'),
+    [
+        ('clutter', 'empty'),
+        ('lookaround', 'empty'),
+        ('behind_box', 'things'),
+        ('small_animal', 'things'),
+        ('normal', 'pictures'),
+        ('camera_motion', 'pictures'),
+    ],
+)
+def test_nothing_else_is_chosen(scenario: str, change: str) -> None:
+    samples = list(bench.rendered(scenario, 7, change))
+    assert not any(s.people for s in samples)
+    tally = bench.judge(samples, SETTINGS)
+    assert (tally.scenes, tally.choices) == (1, 0)
+
+
+def test_people_beside_their_pictures_are_chosen() -> None:
+    tally = bench.judge(bench.rendered('normal', 8, 'pictures'), SETTINGS)
+    assert tally.choices > 10
+    assert tally.wrong == 0
+
+
+def test_only_who_is_in_range_is_chosen() -> None:
+    samples = list(bench.rendered('approach', 7, 'people'))
+    far = bench.judge(samples, NodeParameters(auto_init_far=1.0))
+    assert far.choices == 0
+    choose = AutoInit(NodeParameters(auto_init_near=2.5, auto_init_far=4.0))
+    depths = []
+    for sample in samples:
+        box = choose(sample.frame)
+        if box is not None:
+            x, y = round(box.cx), round(box.y + 0.4 * box.height)
+            depths.append(float(np.nanmedian(sample.frame.depth[y - 4 : y + 4, x - 4 : x + 4])))
+    assert len(depths) >= 3
+    assert 2.3 < min(depths) <= max(depths) < 4.2
+
+
+def test_nobody_is_found_without_depth_or_more_often_than_need_be() -> None:
+    choose = AutoInit(SETTINGS)
+    color = np.zeros((120, 160, 3), np.uint8)
+    assert choose(Frame(color)) is None
+    found = 0
+    for step, sample in enumerate(bench.rendered('normal', 7, 'people')):
+        # Each picture twice, a thirtieth of a second apart: the second is not looked at.
+        frame = sample.frame
+        found += choose(frame) is not None
+        again = Frame(frame.color, frame.depth, frame.stamp_ns + 33_000_000, frame.intrinsics)
+        assert choose(again) is None
+        if step == 12:
+            break
+    assert found > 0
+
+
+@pytest.mark.parametrize(
+    ('bulge', 'turned', 'round_'),
+    [(0.0, 0.0, False), (0.0, 0.3, False), (0.12, 0.0, True), (0.12, 0.1, True)],
+)
+def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool) -> None:
+    """Half a cylinder as thick as a trunk, and a board, square to the camera or turned."""
+    u = np.linspace(-1, 1, 40, dtype=np.float32)
+    depth = np.zeros((120, 160), np.float32)
+    rng = np.random.default_rng(1)
+    trunk = 3.0 - bulge * np.sqrt(1 - 0.95 * u**2) + turned * u
+    depth[20:100, 60:100] = trunk + rng.normal(0, 0.012, (80, 40))
+    view = DepthView(depth, 1, Intrinsics.guess(160, 120))
+    seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
+    assert rounded(view, seen) is round_
