@@ -9,7 +9,7 @@ import argparse
 import importlib
 import importlib.util
 import re
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 import pytest
@@ -58,7 +58,7 @@ def source() -> str:
     )
 
 
-@lru_cache(maxsize=None)
+@cache
 def options(command: str) -> frozenset[str]:
     """What a subcommand takes, its own subcommands' included."""
     parser = argparse.ArgumentParser()
