@@ -11,7 +11,23 @@ import cv2
 import numpy as np
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
+from rgbd_kcf_tracker.metric.decide.evidence import Evidence
 from rgbd_kcf_tracker.pose import Pose
+
+GOOD = Evidence(
+    step=0.5,
+    stride=0.1,
+    fraction=1.0,
+    height=0.0,
+    gone=0.1,
+    missing=False,
+    inland=0.0,
+    look=3.0,
+    mine=5.0,
+    rival=0.0,
+    room=0.0,
+)
+"""What a candidate that fits in every respect is judged by."""
 
 CAMERA = Intrinsics(200.0, 200.0, 120.0, 80.0)
 ROWS, COLS = 160, 240

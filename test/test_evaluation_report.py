@@ -20,7 +20,7 @@ import pytest
 from scipy.io import savemat
 
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.evaluation import plots, strips, tables, thesis, thesis_tables
+from rgbd_kcf_tracker.evaluation import plots, score_tables, strips, thesis, thesis_tables
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import compare, princeton, vot
@@ -99,15 +99,15 @@ def test_per_frame_file_that_is_damaged_is_named(tmp_path: Path, results: list[R
 
 
 def test_overview_is_the_mean_over_sequences(measured: Measured):
-    row = cells(tables.overview(measured), 'rgbd')
+    row = cells(score_tables.overview(measured), 'rgbd')
     assert row['success %'] == pytest.approx(100 * (1 + 0.5) / 2)
     assert row['recall of absence %'] == pytest.approx(100), 'only one sequence has absence'
     assert row['TN %'] == pytest.approx(50), '2 of 2, and 0 of 1'
-    assert cells(tables.overview(measured), 'kcf')['TN %'] is None
+    assert cells(score_tables.overview(measured), 'kcf')['TN %'] is None
 
 
 def test_scenario_tables(measured: Measured):
-    success = tables.by_scenario(measured)[0]
+    success = score_tables.by_scenario(measured)[0]
     assert cells(success, 'occlusion')['kcf'] == pytest.approx(25)
     assert cells(success, 'motion')['kcf'] == pytest.approx(100)
     assert cells(success, 'all')['kcf'] == pytest.approx(62.5)
@@ -173,22 +173,24 @@ def test_ablation_table_shows_what_is_lost(results: list[Result]):
         for r in results
     ]
     infos = {n: Info(n, 's', 'sim', HIDDEN) for n in ('a', 'b')}
-    table = tables.ablation(Measured(renamed, infos), 'rgbd')
+    table = score_tables.ablation(Measured(renamed, infos), 'rgbd')
     assert [row[0] for row in table.rows] == ['rgbd']
     other = [
         dataclasses.replace(r, tracker='rgbd without depth') if r.tracker == 'kcf' else r
         for r in results
     ]
-    table = tables.ablation(Measured(other, infos), 'rgbd')
+    table = score_tables.ablation(Measured(other, infos), 'rgbd')
     change = {row[0]: row[2] for row in table.rows}
     assert change == {'rgbd': None, 'rgbd without depth': pytest.approx(62.5 - 75)}
 
 
 def test_otb_table_counts_the_first_frame_as_the_benchmark_does(results: list[Result]):
     infos = {n: Info(n, 'otb', 'otb', HIDDEN) for n in ('a', 'b')}
-    table = tables.otb_protocol(Measured(results, infos))
+    table = score_tables.otb_protocol(Measured(results, infos))
     assert cells(table, 'kcf')['precision at 20 px'] == pytest.approx((2 / 3 + 1) / 2)
-    assert tables.otb_protocol(Measured(results, {n: Info(n, 's', 'sim') for n in 'ab'})) is None
+    assert (
+        score_tables.otb_protocol(Measured(results, {n: Info(n, 's', 'sim') for n in 'ab'})) is None
+    )
 
 
 def test_short_term_table():
@@ -200,7 +202,7 @@ def test_short_term_table():
 
 
 def test_scores_that_never_vary_have_no_reliability(measured: Measured):
-    table, found = tables.reliability(measured)
+    table, found = score_tables.reliability(measured)
     assert found == {}
     assert cells(table, 'kcf')['Brier'] is None
 
@@ -215,7 +217,7 @@ def test_scores_on_real_and_simulated_data_apart():
     ]
     kinds = {'a': 'sim', 'a2': 'sim', 'b': 'folder', 'b2': 'recording'}
     infos = {n: Info(n, 's', kind, HIDDEN) for n, kind in kinds.items()}
-    table, found = tables.reliability(Measured(runs, infos))
+    table, found = score_tables.reliability(Measured(runs, infos))
     assert list(found) == [('metric', 'real'), ('metric', 'simulated')]
     real, simulated = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
     sure = 'of 0.9 and more'
@@ -227,9 +229,9 @@ def test_scores_on_real_and_simulated_data_apart():
 
 
 def test_interval_of_the_mean():
-    low, high = tables.bootstrap_interval(np.array([0.4, 0.5, 0.6, 0.5] * 20))
+    low, high = score_tables.bootstrap_interval(np.array([0.4, 0.5, 0.6, 0.5] * 20))
     assert 0.47 < low < 0.5 < high < 0.53
-    assert math.isnan(tables.bootstrap_interval(np.array([0.4]))[0])
+    assert math.isnan(score_tables.bootstrap_interval(np.array([0.4]))[0])
 
 
 def test_tables_as_csv_text_and_markdown():
@@ -359,7 +361,7 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
         read_per_frame(report / 'per_frame.csv'),
         {n: Info(n, 'walk', 'folder', HIDDEN) for n in ('walk_1', 'walk_2')},
     )
-    assert cells(tables.overview(measured), 'peer')['success %'] == pytest.approx(
+    assert cells(score_tables.overview(measured), 'peer')['success %'] == pytest.approx(
         float(rows['peer']['success %']), rel=1e-5
     )
 

@@ -9,6 +9,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from people_rig import GOOD
 
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.evidence_fit import (
@@ -20,21 +21,7 @@ from rgbd_kcf_tracker.evaluation.evidence_fit import (
     probabilities,
     with_other_looks,
 )
-from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence
-
-TARGET = Evidence(
-    step=0.5,
-    stride=0.1,
-    fraction=1.0,
-    height=0.0,
-    gone=0.1,
-    missing=False,
-    inland=0.0,
-    look=3.0,
-    mine=5.0,
-    rival=0.0,
-    room=0.0,
-)
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS
 
 
 def met(count: int = 200) -> Examples:
@@ -44,7 +31,7 @@ def met(count: int = 200) -> Examples:
     for i in range(count):
         good = i % 2 == 0
         step = rng.uniform(0, 2) if good else rng.uniform(30, 60)
-        evidence.append(dataclasses.replace(TARGET, step=step, stride=step / 4))
+        evidence.append(dataclasses.replace(GOOD, step=step, stride=step / 4))
         labels.append(int(good))
     groups = np.array([f'scene{i // 2 % 4}' for i in range(count)])
     return Examples(np.array(evidence, np.object_), np.array(labels), np.ones(count), groups)
@@ -75,7 +62,7 @@ def test_a_thing_of_wholly_other_look_at_the_targets_place_does_not_pass():
 
 def test_a_target_that_is_part_of_no_figure_stays_so():
     alone = dataclasses.replace(
-        met(), evidence=np.array([dataclasses.replace(TARGET, mine=0.0)] * 200)
+        met(), evidence=np.array([dataclasses.replace(GOOD, mine=0.0)] * 200)
     )
     assert with_other_looks(alone).evidence[-1].mine == 0
 

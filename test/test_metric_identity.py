@@ -42,7 +42,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, Person
-from rgbd_kcf_tracker.metric.perceive.color_bands import view_lab
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
@@ -62,11 +62,27 @@ def look(
     crop = mask[y[0] : bottom, x[0] : x[-1] + 1]
     view = DepthView(depth, 1, CAMERA)
     seen = Silhouette.of(view, int(x[0]), int(y[0]), crop, 1, Rim())
-    return View.of(view, view_lab(color), seen, top)
+    return View.of(view, color_codes(color), seen, top)
 
 
 def alike(first: View, second: View) -> float:
     return float(similarity(first, Looks.of([second]))[0])
+
+
+def test_stronger_light_moves_lightness_and_leaves_the_tint():
+    color = np.full((4, 4, 3), (80, 90, 120), np.uint8)
+    dark, bright = color_codes(color)[0, 0], color_codes(2 * color)[0, 0]
+    assert bright % (TINTS * TINTS) == dark % (TINTS * TINTS)
+    assert 2 <= bright // (TINTS * TINTS) - dark // (TINTS * TINTS) <= 3
+
+
+def test_the_palette_shows_each_code_in_a_colour_that_has_it():
+    colors = palette()
+    inside = ((colors > 0) & (colors < 255)).all(axis=1)
+    # Codes that no colour of 8 bits has are shown by what is nearest.
+    codes = color_codes(np.rint(colors[None]).astype(np.uint8))[0]
+    assert np.mean(codes[inside] == np.flatnonzero(inside)) > 0.9
+    assert len(colors) == CODES
 
 
 def test_a_view_is_wholly_like_itself_and_unlike_other_colours():
@@ -116,7 +132,7 @@ def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
 
 def test_height_speaks_for_the_same_and_against_another():
     assert height_log_odds(None, 1.7) == height_log_odds(1.7, None) == 0.0
-    assert height_log_odds(1.95, 1.95) > height_log_odds(1.72, 1.72) > 0
+    assert height_log_odds(1.72, 1.72) > height_log_odds(1.72, 1.75) > 0
     assert height_log_odds(1.55, 1.85) < -1
     # Somebody may sit down, so that no height alone can refuse him.
     assert height_log_odds(1.1, 1.85) > -4

@@ -10,10 +10,11 @@ import dataclasses
 import cv2
 import numpy as np
 import pytest
+from people_rig import GOOD
 
 from rgbd_kcf_tracker import Frame, Intrinsics
 from rgbd_kcf_tracker.features.windows import resampled
-from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence, probability
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
@@ -23,17 +24,15 @@ from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
-    CODES,
     band_histograms,
     band_similarity,
-    color_codes,
-    view_lab,
 )
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 CAMERA = Intrinsics(200, 200, 120, 80)
 
@@ -100,7 +99,7 @@ def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():
     depth = wall()
     depth[30:120, 60:100] = 2.0
     depth[30:120, 150:200] = np.linspace(2, 3, 50)
-    surfaces = cut(depth, depth > 0, 0.04, 0.03)
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
     front, slope, back = (surfaces.labels[r, c] for r, c in ((60, 80), (60, 170), (5, 5)))
     assert len({front, slope, back}) == 3
     assert surfaces.pixels[front] == 90 * 40
@@ -137,7 +136,7 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     color = np.zeros((80, 40, 3), np.uint8)
     color[:40] = (200, 30, 30)
     color[40:] = (30, 30, 200)
-    codes = color_codes(view_lab(color))
+    codes = color_codes(color)
     mask = np.ones((80, 40), bool)
     counts = band_histograms(codes, mask, 0, 80)
     assert counts.shape == (BANDS, CODES)
@@ -160,9 +159,10 @@ def test_colours_compare_before_and_after_a_change_of_light():
     # Every pixel 1.5 times as bright, from one frame to the next.
     light = np.clip(dark * 1.5, 0, 255).astype(np.uint8)
     after = reader.read(Frame(light, depth, 1, CAMERA), 0.033).codes
-    assert np.mean(after >> 6 == before >> 6) > 0.8
+    lightness = TINTS * TINTS
+    assert np.mean(after // lightness == before // lightness) > 0.8
     still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA), 0.0).codes
-    assert np.mean(still >> 6 == before >> 6) < 0.5
+    assert np.mean(still // lightness == before // lightness) < 0.5
 
 
 def test_posterior_is_bayes_with_even_odds():
@@ -303,21 +303,6 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
 
 
 # -- the verdict ----------------------------------------------------------------------------------
-
-
-GOOD = Evidence(
-    step=0.5,
-    stride=0.1,
-    fraction=1.0,
-    height=0.0,
-    gone=0.1,
-    missing=False,
-    inland=0.0,
-    look=3.0,
-    mine=5.0,
-    rival=0.0,
-    room=0.0,
-)
 
 
 def test_evidence_speaks_for_what_fits_and_against_what_does_not():

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
-from rgbd_kcf_tracker.bench import live, soak
+from rgbd_kcf_tracker.bench import latency, soak
 
 pytestmark = pytest.mark.ros
 
@@ -24,7 +24,7 @@ def test_benchmark_measures_a_live_camera(
     output = tmp_path / 'live.json'
     # At 15 Hz the topics' history of five holds out a third of a second without the processor.
     rate = ('--rate', '15', '--seconds', '6')
-    live.main(['--sizes', 'qhd', *rate, '--output', str(output)])
+    latency.main(['--sizes', 'qhd', *rate, '--output', str(output)])
     (result,) = json.loads(output.read_text())
     assert result['sent'] == 120
     assert result['received'] >= 115
@@ -36,7 +36,7 @@ def test_benchmark_measures_a_live_camera(
         latencies = [figures[name] for name in ('median_ms', 'p95_ms', 'p99_ms', 'max_ms')]
         assert latencies[0] > 0
         assert latencies == sorted(latencies)
-        assert sum(figures['histogram']) == figures['answered'] - live.WARM_UP
+        assert sum(figures['histogram']) == figures['answered'] - latency.WARM_UP
         assert 0 < figures['cpu_ms'] < 500
     assert result['stages']['work_median_ms'] > 0
     printed = capsys.readouterr().out
@@ -53,7 +53,7 @@ def test_soak_shortened(tmp_path: Path) -> None:
     assert result['end_mb'] - result['settled_mb'] < soak.GROWTH_MB
 
 
-@pytest.mark.parametrize('command', [live.main, soak.main])
+@pytest.mark.parametrize('command', [latency.main, soak.main])
 def test_figures_of_an_earlier_run_are_kept(
     command: Callable[[list[str]], int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

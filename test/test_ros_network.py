@@ -25,7 +25,7 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker.bench.camera import NAMESPACE
-from rgbd_kcf_tracker.bench.live import first_box
+from rgbd_kcf_tracker.bench.latency import first_box
 from rgbd_kcf_tracker.bench.rig import environment
 
 pytestmark = pytest.mark.ros

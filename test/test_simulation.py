@@ -19,9 +19,9 @@ from rgbd_kcf_tracker.simulation.build import check_request
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Motion
 from rgbd_kcf_tracker.simulation.people import Pose, random_person
 from rgbd_kcf_tracker.simulation.room import Room, box_faces, face
-from rgbd_kcf_tracker.simulation.scene import Scene
 from rgbd_kcf_tracker.simulation.sensor import Sensor, SensorOptions
 from rgbd_kcf_tracker.simulation.solids import Atlas, Lighting, SolidList, render
+from rgbd_kcf_tracker.simulation.world import World
 
 SMALL = (320, 180)
 HIDING = (
@@ -38,14 +38,14 @@ def wall(z: float) -> Room:
     return Room([face(corner, np.array([40.0, 0, 0]), np.array([0, 40.0, 0]), GREY)])
 
 
-def ball_scene(*, sensor: SensorOptions = CLEAN, x: float = 0.2, z: float = 2.0) -> Scene:
+def ball_scene(*, sensor: SensorOptions = CLEAN, x: float = 0.2, z: float = 2.0) -> World:
     """A ball of 0.3 m radius hanging at eye level before a wall at 4 m."""
     motion = Motion([(0, x, z)], channels={'lift': [(0, 0.7)]})  # its middle is 1 m up
     actor = ball(np.random.default_rng(0), motion, 0.3)
-    return Scene(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, sensor)
+    return World(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, sensor)
 
 
-def record(scene: Scene, size: tuple[int, int] = (960, 540)) -> SimulatedSequence:
+def record(scene: World, size: tuple[int, int] = (960, 540)) -> SimulatedSequence:
     offsets = [round(k * 1e9 / 30) for k in range(30)]
     return SimulatedSequence(scene, 'test', 0, 30.0, offsets, size, kinect2_intrinsics(size))
 
@@ -83,7 +83,7 @@ def test_depth_is_the_distance_of_the_surface() -> None:
 def test_depth_noise_grows_with_distance() -> None:
     spread = []
     for z in (1.0, 2.0, 4.0):
-        scene = Scene(wall(z), ball_scene().actors, CameraMotion(1.0, 0.0), 1.0, SensorOptions())
+        scene = World(wall(z), ball_scene().actors, CameraMotion(1.0, 0.0), 1.0, SensorOptions())
         depth = record(scene)[0].frame.depth
         assert depth is not None
         part = depth[:60, :400]
@@ -94,7 +94,7 @@ def test_depth_noise_grows_with_distance() -> None:
 
 def test_out_of_range_gives_no_reading() -> None:
     for z in (0.4, 9.0):
-        scene = Scene(wall(z), ball_scene(z=20.0).actors, CameraMotion(1.0, 0.0), 1.0, CLEAN)
+        scene = World(wall(z), ball_scene(z=20.0).actors, CameraMotion(1.0, 0.0), 1.0, CLEAN)
         depth = record(scene)[0].frame.depth
         assert depth is not None
         assert np.isnan(depth).all()
@@ -295,7 +295,7 @@ def test_late_and_shifted_depth_lie_beside_the_colour() -> None:
         (SensorOptions(0, 0, 0, 0, delay_s=0.05), 0.05 * 2 * 540.68 / 2),
         (SensorOptions(0, 0, 0, 0, shift=(-6, 0)), -6),
     ):
-        scene = Scene(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, options)
+        scene = World(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, options)
         simulated = record(scene)[15]
         depth, box = simulated.frame.depth, simulated.visible
         assert depth is not None
@@ -311,7 +311,7 @@ def test_motion_blur_grows_with_exposure() -> None:
     sharpness = []
     for exposure in (0.0, 0.03):
         options = SensorOptions(0, 0, exposure_s=exposure)
-        scene = Scene(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, options)
+        scene = World(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, options)
         row = record(scene)[15].frame.color[270].astype(int).sum(axis=1)
         sharpness.append(np.abs(np.diff(row)).max())
     assert sharpness[1] < 0.5 * sharpness[0]

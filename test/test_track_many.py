@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.batch.workers import LocalPool
 from rgbd_kcf_tracker.cli import track, track_many
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
-from rgbd_kcf_tracker.recordings.tables import join_csv
+from rgbd_kcf_tracker.recordings.rowfiles import join_csv
 
 WORDS = ['--variant', 'kcf', '--jobs', '1']
 

@@ -40,11 +40,11 @@ from rgbd_kcf_tracker.simulation.materials import wallpaper
 from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.people import random_person
 from rgbd_kcf_tracker.simulation.room import Face, face
-from rgbd_kcf_tracker.simulation.scene import Scene, View
 from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
 from rgbd_kcf_tracker.simulation.solids import Lighting
 from rgbd_kcf_tracker.simulation.textures import Texture
 from rgbd_kcf_tracker.simulation.wardrobe import Wardrobe
+from rgbd_kcf_tracker.simulation.world import View, World
 
 RATE_HZ = 5.0
 """At which auto_init looks."""
@@ -195,7 +195,7 @@ def rendered(scenario: str, seed: int, change: str) -> Iterator[Sample]:
         yield Sample(moment.frame, None, people=present, number=number)
 
 
-def _pictures(scene: Scene, rng: np.random.Generator, camera: Intrinsics) -> list[Face]:
+def _pictures(scene: World, rng: np.random.Generator, camera: Intrinsics) -> list[Face]:
     """Life-size pictures of people: two on the back wall, one on a stand in the room."""
     wall = max(f.corner[2] for f in scene.room.faces)
     places = [

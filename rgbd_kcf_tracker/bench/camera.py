@@ -50,7 +50,7 @@ def main(args: list[str] | None = None) -> int:
     from rclpy.executors import ExternalShutdownException
 
     rclpy.init()
-    camera = Camera(options.size, options.frames, options.compressed, options.wire)
+    camera = CameraNode(options.size, options.frames, options.compressed, options.wire)
     try:
         if not camera.await_listener(MATCH_TIMEOUT_S):
             return 1
@@ -67,7 +67,7 @@ def main(args: list[str] | None = None) -> int:
     return 0
 
 
-class Camera:
+class CameraNode:
     """Publishers of a colour, a depth and a camera_info topic, and what they send."""
 
     def __init__(self, size: str, frames: int, compressed: bool, wire: bool = False) -> None:

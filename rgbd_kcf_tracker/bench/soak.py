@@ -20,7 +20,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.bench.camera import NAMESPACE, SIZES
 from rgbd_kcf_tracker.bench.figures import add_output_options, check_output, write_output
-from rgbd_kcf_tracker.bench.live import first_box
+from rgbd_kcf_tracker.bench.latency import first_box
 from rgbd_kcf_tracker.bench.rig import Listener, child, environment, resident_mb
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS

@@ -176,7 +176,7 @@ def _report(folder: Path, whole: Whole) -> int:
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.perframe import collect
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
-    from rgbd_kcf_tracker.evaluation.tables import overview
+    from rgbd_kcf_tracker.evaluation.score_tables import overview
 
     if whole.everyone:
         return _report_everyone(folder, whole)

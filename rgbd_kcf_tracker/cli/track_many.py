@@ -341,7 +341,7 @@ def _reason(error: Exception | None) -> str:
 def _write_tables(
     folder: Path, jobs: Sequence[TrackJob], failed: dict[str, dict[str, Any]], form: str
 ) -> None:
-    from rgbd_kcf_tracker.recordings.tables import join_csv, write_rows
+    from rgbd_kcf_tracker.recordings.rowfiles import join_csv, write_rows
 
     header = ('name', 'source', 'frames', 'targets', *_STATES, 'success', 'iou', 'strangers',
               'warnings', 'error')  # fmt: skip

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, mean
+from rgbd_kcf_tracker.evaluation.score_tables import Column, scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
-from rgbd_kcf_tracker.evaluation.tables import Column, scaled
 
 COLUMNS: tuple[Column, ...] = (
     Column('hota', 'HOTA %'),

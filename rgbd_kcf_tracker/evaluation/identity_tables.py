@@ -15,8 +15,8 @@ import numpy as np
 from rgbd_kcf_tracker.evaluation.identity import APART_S, MOST_VIEWS, Pairs
 from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability
 from rgbd_kcf_tracker.evaluation.metrics.separation import balanced_reliability
+from rgbd_kcf_tracker.evaluation.score_tables import scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
-from rgbd_kcf_tracker.evaluation.tables import scaled
 
 PAIRS_HEADER = (
     'recording', 'frame', 'id', 'other_recording', 'other_frame', 'other_id', 'same', 'probability',

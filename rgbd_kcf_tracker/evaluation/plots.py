@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE, Reliability
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Effect
 from rgbd_kcf_tracker.evaluation.perframe import Result
-from rgbd_kcf_tracker.evaluation.tables import REAL, SIMULATED, Scored
+from rgbd_kcf_tracker.evaluation.score_tables import REAL, SIMULATED, Scored
 
 ERROR_CAP_PX = 150.0
 """Centre errors are drawn up to here, as in the thesis's Figure 3.3."""

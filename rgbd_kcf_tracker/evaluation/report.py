@@ -18,8 +18,8 @@ from rgbd_kcf_tracker.evaluation import (
     page,
     plot_style,
     plots,
+    score_tables,
     sweep_tables,
-    tables,
     thesis_tables,
 )
 from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -82,18 +82,18 @@ def write_report(
         raise DatasetError(_why_nothing(failures))
 
     curves = plots.mean_curves(measured)
-    long_term, long_curves = tables.long_term(measured)
-    reliability, reliabilities = tables.reliability(measured)
-    protocols = [t for t in (tables.otb_protocol(measured),) if t is not None]
+    long_term, long_curves = score_tables.long_term(measured)
+    reliability, reliabilities = score_tables.reliability(measured)
+    protocols = [t for t in (score_tables.otb_protocol(measured),) if t is not None]
     if collected.short_term:
         protocols.append(thesis_tables.short_term(collected.short_term, heading.eao_lengths))
     content: dict[str, Any] = {
-        'overview': tables.overview(measured),
-        'ablations': [tables.ablation(measured, name) for name in heading.ablated],
-        'scenario_tables': tables.by_scenario(measured),
+        'overview': score_tables.overview(measured),
+        'ablations': [score_tables.ablation(measured, name) for name in heading.ablated],
+        'scenario_tables': score_tables.by_scenario(measured),
         'thesis_tables': thesis_tables.all_tables(measured),
         'protocols': protocols,
-        'sequence_table': tables.by_sequence(measured),
+        'sequence_table': score_tables.by_sequence(measured),
         'long_term': long_term,
         'reliability': reliability,
     }

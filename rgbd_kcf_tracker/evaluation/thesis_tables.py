@@ -14,8 +14,8 @@ from rgbd_kcf_tracker.evaluation import thesis
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import confusion, princeton, vot
 from rgbd_kcf_tracker.evaluation.perframe import Info
+from rgbd_kcf_tracker.evaluation.score_tables import confusion_cells, scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
-from rgbd_kcf_tracker.evaluation.tables import confusion_cells, scaled
 
 _SPLITS = tuple(princeton.CATEGORIES.items())
 _NOT_OURS = (

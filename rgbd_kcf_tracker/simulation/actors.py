@@ -17,9 +17,9 @@ from rgbd_kcf_tracker.simulation import materials, textures
 from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.room import Face, draw_face
-from rgbd_kcf_tracker.simulation.scene import View
 from rgbd_kcf_tracker.simulation.solids import Atlas, Layer, SolidList, Solids, render
 from rgbd_kcf_tracker.simulation.walking import Visit
+from rgbd_kcf_tracker.simulation.world import View
 
 Vector = npt.NDArray[np.float64]
 Window = tuple[int, int, int, int]

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.simulation.room import draw_face
-from rgbd_kcf_tracker.simulation.scene import Actor, Scene, Vector, View
 from rgbd_kcf_tracker.simulation.solids import Layer, Lighting, render
+from rgbd_kcf_tracker.simulation.world import Actor, Vector, View, World
 
 Image = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
@@ -61,7 +61,7 @@ class Backdrop:
         size: width and height of the picture.
     """
 
-    def __init__(self, scene: Scene, camera: Intrinsics, size: tuple[int, int]) -> None:
+    def __init__(self, scene: World, camera: Intrinsics, size: tuple[int, int]) -> None:
         self.scene, self.camera, self.size = scene, camera, size
         self._still: tuple[Image, Floats] | None = None
 

@@ -9,8 +9,8 @@ import math
 
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, hand_waves
 from rgbd_kcf_tracker.simulation.room import add_furniture
-from rgbd_kcf_tracker.simulation.scene import Actor, Gain, Scene
 from rgbd_kcf_tracker.simulation.stage import Point, Stage, route, scenario
+from rgbd_kcf_tracker.simulation.world import Actor, Gain, World
 
 
 def stroll(
@@ -26,7 +26,7 @@ def stroll(
 
 
 @scenario('one person walks to and fro in an ordinary room')
-def normal(stage: Stage) -> Scene:
+def normal(stage: Stage) -> World:
     """The thesis's normal case."""
     way = stroll(stage, stage.uniform(0.6, 1.3), int(stage.rng.integers(2, 4)), z=(1.7, 4.3))
     return stage.scene(
@@ -35,7 +35,7 @@ def normal(stage: Stage) -> Scene:
 
 
 @scenario('a cluttered room and people standing behind the target')
-def clutter(stage: Stage) -> Scene:
+def clutter(stage: Stage) -> World:
     """The thesis's background clutter."""
     room = stage.room((9, 14))
     for _ in range(4):
@@ -47,7 +47,7 @@ def clutter(stage: Stage) -> Scene:
 
 
 @scenario('a person crouches, spreads the arms and turns about')
-def deformation(stage: Stage) -> Scene:
+def deformation(stage: Stage) -> World:
     """The thesis's deformation: shape changes on the spot and while walking."""
     z = stage.uniform(2.0, 3.2)
     x0 = stage.x(stage.uniform(-0.4, 0.1), z)
@@ -61,7 +61,7 @@ def deformation(stage: Stage) -> Scene:
 
 
 @scenario('a person jogs and changes direction quickly')
-def motion(stage: Stage) -> Scene:
+def motion(stage: Stage) -> World:
     """The thesis's fast motion."""
     way = stroll(stage, stage.uniform(1.8, 2.6), 4, wide=0.8)
     return stage.scene(
@@ -70,7 +70,7 @@ def motion(stage: Stage) -> Scene:
 
 
 @scenario('a person runs across the view within about a second, with motion blur, and back')
-def fast_motion(stage: Stage) -> Scene:
+def fast_motion(stage: Stage) -> World:
     """Steps of a tenth of the picture's width between frames at 30 Hz."""
     z, side = stage.uniform(2.4, 3.6), stage.sign()
     left, right = stage.x(-0.72 * side, z), stage.x(0.72 * side, z + stage.uniform(-0.4, 0.4))
@@ -84,7 +84,7 @@ def fast_motion(stage: Stage) -> Scene:
 
 
 @scenario('a person walks towards the camera at 1.5 m/s, from 5 m to 0.8 m')
-def approach(stage: Stage) -> Scene:
+def approach(stage: Stage) -> World:
     """The size grows sixfold."""
     far, near = stage.uniform(4.6, 5.2), stage.uniform(0.8, 1.0)
     far = min(far, stage.depth - 0.6)
@@ -96,7 +96,7 @@ def approach(stage: Stage) -> Scene:
 
 
 @scenario('a person walks away from the camera at 1.5 m/s, from 0.9 m to 5 m')
-def recede(stage: Stage) -> Scene:
+def recede(stage: Stage) -> World:
     """The size shrinks sixfold."""
     far, near = min(stage.uniform(4.6, 5.2), stage.depth - 0.6), stage.uniform(0.9, 1.2)
     start, end = stage.x(stage.uniform(-0.2, 0.2), near), stage.x(stage.uniform(-0.4, 0.4), far)
@@ -106,7 +106,7 @@ def recede(stage: Stage) -> Scene:
 
 
 @scenario('the light changes suddenly, twice; the automatic exposure follows slowly')
-def light_change(stage: Stage) -> Scene:
+def light_change(stage: Stage) -> World:
     """A lamp goes off or on between two frames, its colour with it."""
     way = stroll(stage, stage.uniform(0.7, 1.2), 3)
     duration = min(way[-1][0] + 0.4, 7.5)
@@ -133,7 +133,7 @@ def light_change(stage: Stage) -> Scene:
 
 
 @scenario('the camera shakes in a hand or pans slowly while the target walks')
-def camera_motion(stage: Stage) -> Scene:
+def camera_motion(stage: Stage) -> World:
     """The whole picture moves."""
     way = stroll(stage, stage.uniform(0.6, 1.2), 2, wide=0.5)
     duration = min(way[-1][0] + 0.5, 7.0)
@@ -148,7 +148,7 @@ def camera_motion(stage: Stage) -> Scene:
 
 
 @scenario('the target is cut by the border of the picture, close to the camera')
-def border(stage: Stage) -> Scene:
+def border(stage: Stage) -> World:
     """Legs below the picture, then half the body beyond a side."""
     z, side = stage.uniform(1.1, 1.6), stage.sign()
     x = [stage.x(side * s, z) for s in (0.1, 0.85, 0.2, -0.9, -0.2)]
@@ -159,7 +159,7 @@ def border(stage: Stage) -> Scene:
 
 
 @scenario('a crowd of people walks about; some pass before the target')
-def crowd(stage: Stage) -> Scene:
+def crowd(stage: Stage) -> World:
     """Four to six others at all distances."""
     way = stroll(stage, stage.uniform(0.6, 1.0), 2, z=(2.6, 3.4))
     duration = min(way[-1][0] + 0.5, 8.0)
@@ -176,7 +176,7 @@ def crowd(stage: Stage) -> Scene:
 
 
 @scenario('people in the same clothes stand about and cross the target')
-def lookalike(stage: Stage) -> Scene:
+def lookalike(stage: Stage) -> World:
     """The lookalike wears the same outfit, or nearly the same."""
     target = stage.person()
     clothes = stage.cast[0]

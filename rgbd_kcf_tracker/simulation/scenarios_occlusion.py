@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from rgbd_kcf_tracker.simulation.room import chair
-from rgbd_kcf_tracker.simulation.scene import Actor, Scene
 from rgbd_kcf_tracker.simulation.stage import Point, Stage, route, scenario
+from rgbd_kcf_tracker.simulation.world import Actor, World
 
 
 def _behind(
     stage: Stage, *, way_shares: list[float], width: float, at: float = 0.0,
     speed: tuple[float, float] = (0.8, 1.3), height: tuple[float, float] = (1.6, 2.1),
-) -> tuple[list[Point], float, Scene]:  # fmt: skip
+) -> tuple[list[Point], float, World]:  # fmt: skip
     """A cupboard before the path; the points of the path, its speed, and a scene without actors."""
     near, far = stage.uniform(1.7, 2.3), stage.uniform(2.9, 3.8)
     room = stage.room()
@@ -37,7 +37,7 @@ def _far_and_near(stage: Stage, low: float, high: float) -> tuple[float, float, 
 
 
 @scenario('the target walks behind a cupboard, shelf or pile of boxes and comes out again')
-def occlusion(stage: Stage) -> Scene:
+def occlusion(stage: Stage) -> World:
     """The thesis's full occlusion."""
     points, speed, scene = _behind(
         stage, way_shares=[-0.75, 0.75, 0.75, -0.7], width=stage.uniform(0.8, 1.3),
@@ -50,7 +50,7 @@ def occlusion(stage: Stage) -> Scene:
 
 
 @scenario('the target goes behind a box and turns back: it comes out where it went in')
-def turn_back(stage: Stage) -> Scene:
+def turn_back(stage: Stage) -> World:
     """Hidden for a second or so, then out on the same side."""
     points, speed, scene = _behind(stage, way_shares=[-0.75, 0.0, 0.0, 0.0, -0.8],
                                    width=stage.uniform(0.9, 1.3))  # fmt: skip
@@ -61,7 +61,7 @@ def turn_back(stage: Stage) -> Scene:
 
 
 @scenario('the target stands behind a box for several seconds')
-def long_occlusion(stage: Stage) -> Scene:
+def long_occlusion(stage: Stage) -> World:
     """Hidden for 3 to 5 seconds, out on either side."""
     out = 0.8 * stage.sign()
     points, speed, scene = _behind(stage, way_shares=[-0.75, 0.0, out],
@@ -75,7 +75,7 @@ def long_occlusion(stage: Stage) -> Scene:
 
 
 @scenario('the target is hidden a few frames after the start')
-def early_occlusion(stage: Stage) -> Scene:
+def early_occlusion(stage: Stage) -> World:
     """A fifth to half a second after the given box."""
     stage.place_camera(0.75, 1.3)
     far, near, side = stage.uniform(2.8, 3.5), stage.uniform(1.0, 1.25), stage.sign()
@@ -96,7 +96,7 @@ def early_occlusion(stage: Stage) -> Scene:
 
 
 @scenario('the target and another person walk past each other, then one overtakes the other')
-def crossing(stage: Stage) -> Scene:
+def crossing(stage: Stage) -> World:
     """The thesis's moving target and moving occluder."""
     far, near, side = _far_and_near(stage, 2.7, 3.8)
     speed = stage.uniform(0.7, 1.1)
@@ -117,7 +117,7 @@ def crossing(stage: Stage) -> Scene:
 
 
 @scenario('somebody passes before a standing target, and back, and may stop there')
-def passer_by(stage: Stage) -> Scene:
+def passer_by(stage: Stage) -> World:
     """The thesis's standing target and moving occluder."""
     far, near, side = _far_and_near(stage, 2.6, 3.8)
     x = stage.x(stage.uniform(-0.3, 0.3), far)
@@ -138,7 +138,7 @@ def passer_by(stage: Stage) -> Scene:
 
 
 @scenario('a hand-held camera, a walking target, and a passer-by who hides it')
-def camera_occlusion(stage: Stage) -> Scene:
+def camera_occlusion(stage: Stage) -> World:
     """Camera motion and occlusion together."""
     far, near, side = _far_and_near(stage, 2.7, 3.6)
     way = route([(stage.x(side * s, far), far) for s in (-0.5, 0.5, 0.5, -0.4)],
@@ -152,7 +152,7 @@ def camera_occlusion(stage: Stage) -> Scene:
 
 
 @scenario('a box on wheels is pushed before the standing target and stays for a while')
-def behind_box(stage: Stage) -> Scene:
+def behind_box(stage: Stage) -> World:
     """The thesis's occlusion by a box; who pushes it walks behind it."""
     far, near, side = stage.uniform(2.6, 3.4), stage.uniform(1.5, 2.0), stage.sign()
     x = stage.x(stage.uniform(-0.25, 0.25), far)
@@ -173,7 +173,7 @@ def behind_box(stage: Stage) -> Scene:
 
 
 @scenario('the target ducks behind an armchair close to the camera')
-def behind_chair(stage: Stage) -> Scene:
+def behind_chair(stage: Stage) -> World:
     """The thesis's occlusion by a chair: partly while standing behind it, fully when ducking."""
     stage.camera_height, stage.pitch = stage.uniform(0.85, 1.0), 0.02
     near, far, side = stage.uniform(1.3, 1.6), stage.uniform(2.5, 3.0), stage.sign()
@@ -194,7 +194,7 @@ def behind_chair(stage: Stage) -> Scene:
 
 
 @scenario('the target steps behind a standing person and comes out on the other side')
-def behind_person(stage: Stage) -> Scene:
+def behind_person(stage: Stage) -> World:
     """The thesis's occlusion by a person who stands still."""
     stage.place_camera(0.75, 1.3)
     near, far, side = stage.uniform(1.5, 1.9), stage.uniform(2.8, 3.4), stage.sign()
@@ -210,7 +210,7 @@ def behind_person(stage: Stage) -> Scene:
 
 
 @scenario('somebody walks so close before the target that the two touch')
-def touching(stage: Stage) -> Scene:
+def touching(stage: Stage) -> World:
     """A gap of 10 to 30 cm in depth: the surfaces join."""
     z, side = stage.uniform(2.3, 3.2), stage.sign()
     x = stage.x(stage.uniform(-0.2, 0.2), z)
@@ -229,7 +229,7 @@ def touching(stage: Stage) -> Scene:
 
 
 @scenario('the target leaves the view and returns through the same edge')
-def out_of_view(stage: Stage) -> Scene:
+def out_of_view(stage: Stage) -> World:
     """The thesis's out of view."""
     z, side = stage.uniform(2.2, 3.2), stage.sign()
     points: list[Point] = [(stage.x(side * s, z), z) for s in (-0.3, 1.4, 1.4, 1.4, -0.4)]
@@ -238,7 +238,7 @@ def out_of_view(stage: Stage) -> Scene:
 
 
 @scenario('the target leaves the view and returns through the other edge')
-def other_edge(stage: Stage) -> Scene:
+def other_edge(stage: Stage) -> World:
     """It passes behind the camera, unseen."""
     z, side = stage.uniform(2.2, 3.0), stage.sign()
     speed = stage.uniform(1.0, 1.4)
@@ -253,7 +253,7 @@ def other_edge(stage: Stage) -> Scene:
 
 
 @scenario('the target goes behind a box while somebody in the same clothes walks out')
-def decoy(stage: Stage) -> Scene:
+def decoy(stage: Stage) -> World:
     """The lookalike comes out where the target is expected; the target follows later."""
     points, speed, scene = _behind(stage, way_shares=[-0.7, 0.0, 0.7],
                                    width=stage.uniform(1.0, 1.4))  # fmt: skip

@@ -15,9 +15,9 @@ from rgbd_kcf_tracker.simulation.floorplan import Point
 from rgbd_kcf_tracker.simulation.hall import DOOR, Exit, Hall
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, hand_waves
 from rgbd_kcf_tracker.simulation.people import Person
-from rgbd_kcf_tracker.simulation.scene import Actor, Gain, Scene
 from rgbd_kcf_tracker.simulation.stage import Stage, scenario
 from rgbd_kcf_tracker.simulation.walking import Action, Away, Go, Stay, Visit, Walker, rehearse
+from rgbd_kcf_tracker.simulation.world import Actor, Gain, World
 
 LONG_S = 45.0
 ABSENCE_S = (6.0, 25.0)
@@ -194,7 +194,7 @@ def _scene(
     hall: Hall, diaries: list[_Diary], seconds: float,
     camera: CameraMotion | None = None,
     light: Callable[[list[list[Visit]]], Callable[[float], Gain]] | None = None,
-) -> Scene:  # fmt: skip
+) -> World:  # fmt: skip
     """Let them carry out their plans; ``light`` may depend on when they are there."""
     stage = hall.stage
     visits = rehearse([diary.walker() for diary in diaries], hall.plan, seconds)
@@ -219,14 +219,14 @@ def _people(stage: Stage, low: int, high: int) -> list[Person]:
 
 
 @several('4 to 6 people leave the view through the sides or a door and come back elsewhere')
-def comers(stage: Stage) -> Scene:
+def comers(stage: Stage) -> World:
     """Absences of 6 to 25 s."""
     hall = _hall(stage)
     return _scene(hall, _come_and_go(hall, _people(stage, 4, 6), LONG_S), LONG_S)
 
 
 @several('as comers; two wear the same clothes and differ in height and build alone')
-def comers_twins(stage: Stage) -> Scene:
+def comers_twins(stage: Stage) -> World:
     """The first is one of them."""
     people = _people(stage, 4, 6)
     short, tall = stage.uniform(1.55, 1.66), stage.uniform(1.79, 1.92)
@@ -241,7 +241,7 @@ def comers_twins(stage: Stage) -> Scene:
 
 
 @several('as comers; the light falls or changes its colour while the target is away')
-def comers_dusk(stage: Stage) -> Scene:
+def comers_dusk(stage: Stage) -> World:
     """Over seconds, or at once as with a lamp; the exposure has made up for what it can."""
     hall = _hall(stage)
     diaries = _come_and_go(hall, _people(stage, 4, 6), LONG_S)
@@ -270,7 +270,7 @@ def _dusk(stage: Stage, visits: list[Visit]) -> Callable[[float], Gain]:
 
 
 @several('the target leaves for 30 s and comes back in another place; others remain')
-def reunion(stage: Stage) -> Scene:
+def reunion(stage: Stage) -> World:
     """Perhaps a stranger enters meanwhile, where the target left."""
     hall = _hall(stage)
     diaries = [_Diary(hall, person) for person in _people(stage, 3, 5)]
@@ -295,7 +295,7 @@ def reunion(stage: Stage) -> Scene:
 
 
 @several('a group crosses, stands together, touches, and walks on side by side')
-def group_crossing(stage: Stage) -> Scene:
+def group_crossing(stage: Stage) -> World:
     """Nobody leaves for long; everybody hides everybody."""
     hall = _hall(stage)
     diaries = [_Diary(hall, person) for person in _people(stage, 4, 6)]
@@ -339,7 +339,7 @@ def group_crossing(stage: Stage) -> Scene:
 
 
 @several('a camera turns to and fro at 23 degrees a second among people who stand, sit and walk')
-def lookaround(stage: Stage) -> Scene:
+def lookaround(stage: Stage) -> World:
     """They leave the view because the camera does."""
     hall = _hall(stage)
     diaries = [_Diary(hall, person) for person in _people(stage, 3, 5)]

@@ -13,8 +13,8 @@ from rgbd_kcf_tracker.simulation.actors import FacesActor, PersonActor, animal, 
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, Motion, Vector, hand_waves
 from rgbd_kcf_tracker.simulation.room import table
 from rgbd_kcf_tracker.simulation.scenarios_basic import stroll
-from rgbd_kcf_tracker.simulation.scene import Actor, Scene
 from rgbd_kcf_tracker.simulation.stage import Point, Stage, route, scenario
+from rgbd_kcf_tracker.simulation.world import Actor, World
 
 
 def _walk_with_passer(stage: Stage) -> tuple[list[Actor], float]:
@@ -31,7 +31,7 @@ def _walk_with_passer(stage: Stage) -> tuple[list[Actor], float]:
 
 
 @scenario('the target gives no depth reading for seconds, as in sunlight or behind glass')
-def missing_depth(stage: Stage) -> Scene:
+def missing_depth(stage: Stage) -> World:
     """Depth goes and comes back while the target is seen all the time but for a passer-by."""
     cast, duration = _walk_with_passer(stage)
     first = stage.uniform(0.1, 0.3) * duration
@@ -42,14 +42,14 @@ def missing_depth(stage: Stage) -> Scene:
 
 
 @scenario('a camera without depth')
-def no_depth(stage: Stage) -> Scene:
+def no_depth(stage: Stage) -> World:
     """Colour alone, with one passer-by."""
     cast, duration = _walk_with_passer(stage)
     return stage.scene(cast, duration, sensor=stage.sensor(has_depth=False))
 
 
 @scenario('depth registered three to six pixels beside the colour')
-def misregistered(stage: Stage) -> Scene:
+def misregistered(stage: Stage) -> World:
     """A calibration that has slipped."""
     cast, duration = _walk_with_passer(stage)
     shift = (stage.sign() * int(stage.rng.integers(3, 7)), int(stage.rng.integers(-3, 4)))
@@ -57,14 +57,14 @@ def misregistered(stage: Stage) -> Scene:
 
 
 @scenario('depth taken 30 to 70 ms later than the colour')
-def late_depth(stage: Stage) -> Scene:
+def late_depth(stage: Stage) -> World:
     """Unsynchronised cameras: a walker's depth runs ahead of the colour."""
     cast, duration = _walk_with_passer(stage)
     return stage.scene(cast, duration, sensor=stage.sensor(delay_s=stage.uniform(0.03, 0.07)))
 
 
 @scenario('many holes and strong noise in the depth')
-def holes(stage: Stage) -> Scene:
+def holes(stage: Stage) -> World:
     """A tenth of the readings is missing."""
     cast, duration = _walk_with_passer(stage)
     sensor = stage.sensor(holes=stage.uniform(0.06, 0.15), depth_noise=stage.uniform(1.5, 2.5))
@@ -72,7 +72,7 @@ def holes(stage: Stage) -> Scene:
 
 
 @scenario('the target walks beyond the reliable range of the depth camera, 4 to 7 m away')
-def far(stage: Stage) -> Scene:
+def far(stage: Stage) -> World:
     """Readings fall out with distance."""
     stage.depth = stage.uniform(7.2, 8.5)
     stage.half_width = stage.uniform(0.5, 0.8) * stage.depth
@@ -84,7 +84,7 @@ def far(stage: Stage) -> Scene:
 
 
 @scenario('a person turns about on the spot')
-def turning(stage: Stage) -> Scene:
+def turning(stage: Stage) -> World:
     """Once or twice around, at 1 to 3 m."""
     z = stage.uniform(1.0, 3.0)
     x, full = stage.x(stage.uniform(-0.3, 0.3), z), 2 * math.pi * stage.sign()
@@ -96,7 +96,7 @@ def turning(stage: Stage) -> Scene:
 
 
 @scenario('a person crouches and stands up, twice, and walks on')
-def crouch(stage: Stage) -> Scene:
+def crouch(stage: Stage) -> World:
     """The height halves within a second."""
     z, side = stage.uniform(1.8, 3.2), stage.sign()
     x = stage.x(-0.3 * side, z)
@@ -110,7 +110,7 @@ def crouch(stage: Stage) -> Scene:
 
 
 @scenario('a person raises and lowers the arms')
-def arms_out(stage: Stage) -> Scene:
+def arms_out(stage: Stage) -> World:
     """The width triples and falls back."""
     z = stage.uniform(1.6, 3.2)
     x = stage.x(stage.uniform(-0.35, 0.35), z)
@@ -123,7 +123,7 @@ def arms_out(stage: Stage) -> Scene:
 
 
 @scenario('a mug on a table before a moving hand-held camera; it leaves the view and returns')
-def mug_hand_held(stage: Stage) -> Scene:
+def mug_hand_held(stage: Stage) -> World:
     """Small object, moving camera, other things on the table."""
     rng, side = stage.rng, stage.sign()
     z = stage.uniform(0.85, 1.2)
@@ -154,7 +154,7 @@ def mug_hand_held(stage: Stage) -> Scene:
 
 
 @scenario('a ball rolls and bounces between two people and behind a box')
-def ball_game(stage: Stage) -> Scene:
+def ball_game(stage: Stage) -> World:
     """Small, fast, turning."""
     rng, side = stage.rng, stage.sign()
     stage.pitch = stage.uniform(0.12, 0.22)
@@ -181,7 +181,7 @@ def ball_game(stage: Stage) -> Scene:
 
 
 @scenario('a dog or cat trots about on the floor and behind a chair or box')
-def small_animal(stage: Stage) -> Scene:
+def small_animal(stage: Stage) -> World:
     """Low, close to the floor."""
     rng, side = stage.rng, stage.sign()
     stage.pitch = stage.uniform(0.15, 0.25)
@@ -201,7 +201,7 @@ def small_animal(stage: Stage) -> Scene:
 
 
 @scenario('a face close to the camera; somebody passes, the head moves and turns')
-def face(stage: Stage) -> Scene:
+def face(stage: Stage) -> World:
     """The target is the head alone."""
     person = stage.person()
     z = stage.uniform(0.75, 1.05)
@@ -223,7 +223,7 @@ def face(stage: Stage) -> Scene:
 
 
 @scenario('a mug carried about in the hand of a walking person')
-def carried_mug(stage: Stage) -> Scene:
+def carried_mug(stage: Stage) -> World:
     """A small target that moves with somebody bigger."""
     person = stage.person()
     side = stage.sign()

@@ -14,8 +14,8 @@ import numpy as np
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
-from rgbd_kcf_tracker.simulation.scene import Scene, Vector
 from rgbd_kcf_tracker.simulation.sensor import Sensor
+from rgbd_kcf_tracker.simulation.world import Vector, World
 
 EPOCH_NS = 1_700_000_000_000_000_000
 
@@ -74,7 +74,7 @@ class SimulatedSequence:
     """
 
     def __init__(
-        self, scene: Scene, scenario: str, seed: int, rate_hz: float, offsets_ns: Sequence[int],
+        self, scene: World, scenario: str, seed: int, rate_hz: float, offsets_ns: Sequence[int],
         size: tuple[int, int], intrinsics: Intrinsics,
     ) -> None:  # fmt: skip
         self.scene, self.scenario, self.seed, self.rate_hz = scene, scenario, seed, rate_hz

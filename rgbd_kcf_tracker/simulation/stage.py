@@ -18,9 +18,9 @@ from rgbd_kcf_tracker.simulation.actors import FacesActor, PersonActor
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, Motion, hand_waves
 from rgbd_kcf_tracker.simulation.people import Person, random_person
 from rgbd_kcf_tracker.simulation.room import Face, Room, box_faces, random_room
-from rgbd_kcf_tracker.simulation.scene import Actor, Gain, Scene
 from rgbd_kcf_tracker.simulation.sensor import SensorOptions
 from rgbd_kcf_tracker.simulation.wardrobe import Wardrobe
+from rgbd_kcf_tracker.simulation.world import Actor, Gain, World
 
 Point = tuple[float, float]
 Timed = list[tuple[float, float, float]]
@@ -39,7 +39,7 @@ class Scenario:
 
     name: str
     description: str
-    build: Callable[[Stage], Scene]
+    build: Callable[[Stage], World]
     several: bool = False
 
 
@@ -49,10 +49,10 @@ ALL, PEOPLE = 'all', 'people'
 
 def scenario(
     description: str, several: bool = False
-) -> Callable[[Callable[[Stage], Scene]], Callable[[Stage], Scene]]:
+) -> Callable[[Callable[[Stage], World]], Callable[[Stage], World]]:
     """Register the function under its own name."""
 
-    def register(build: Callable[[Stage], Scene]) -> Callable[[Stage], Scene]:
+    def register(build: Callable[[Stage], World]) -> Callable[[Stage], World]:
         SCENARIOS[build.__name__] = Scenario(build.__name__, description, build, several)
         return build
 
@@ -178,11 +178,11 @@ class Stage:
         self, actors: Sequence[Actor], duration_s: float, *, room: Room | None = None,
         camera: CameraMotion | None = None, sensor: SensorOptions | None = None,
         light: Callable[[float], Gain] | None = None,
-    ) -> Scene:  # fmt: skip
+    ) -> World:  # fmt: skip
         """Put everything together; what is not given is random."""
         rng = self.rng
         sun = np.array([self.uniform(-1, 1), -1.0, self.uniform(-1.0, 0.2)])
-        scene = Scene(
+        scene = World(
             room=room if room is not None else self.room(), actors=list(actors),
             camera=camera or CameraMotion(self.camera_height, self.pitch),
             duration_s=duration_s, sensor=sensor or self.sensor(), sun=sun,

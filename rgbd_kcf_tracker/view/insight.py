@@ -12,21 +12,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide import evidence
-from rgbd_kcf_tracker.metric.identity.gallery import (
-    CHROMA,
-    CHROMA_GAIN,
-    LIGHTNESS,
-    Gallery,
-    View,
-)
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.colors import palette
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker
@@ -89,7 +83,7 @@ class Insight:
 
 
 COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
-    'surfaces': (cut,),
+    'surfaces': (surfaces_in,),
     'particles': (HiddenCloud.step,),
     'considered': (evidence.probability, evidence.Evidence.features),
     'gallery': (View.of, Gallery.learn),
@@ -170,23 +164,8 @@ def colors_of(view: View) -> Array:
     Returns:
         ``(SLICES, 3)`` float RGB, 0 to 1; NaN where nothing of the slice shows.
     """
-    share = np.square(view.roots, dtype=np.float64).reshape(len(view.roots), LIGHTNESS, -1)
-    level = (np.arange(LIGHTNESS) + 0.5) * 256 / LIGHTNESS
-    tint = 2 * (np.arange(CHROMA) + 0.5) / CHROMA - 1
-    value = 128 + np.arctanh(tint) / CHROMA_GAIN
-    total = share.sum(axis=(1, 2))
-    weight = np.where(total > 0, total, np.nan)
-    by_chroma = share.sum(axis=1).reshape(len(share), CHROMA, CHROMA)
-    lab = np.stack(
-        (
-            share.sum(axis=2) @ level / weight,
-            by_chroma.sum(axis=2) @ value / weight,
-            by_chroma.sum(axis=1) @ value / weight,
-        ),
-        axis=1,
-    )
-    whole = np.clip(np.nan_to_num(lab), 0, 255).astype(np.uint8)[None]
-    rgb = cv2.cvtColor(whole, cv2.COLOR_Lab2RGB)[0].astype(np.float64) / 255
-    rgb[np.isnan(lab[:, 0])] = np.nan
+    share = np.square(view.roots, dtype=np.float64).reshape(len(view.roots), -1)
+    total = share.sum(axis=1, keepdims=True)
+    rgb = share @ palette()[:, ::-1] / np.where(total > 0, total, np.nan) / 255
     colors: Array = rgb
     return colors

@@ -58,8 +58,8 @@ SAME = 0.8
 MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure."""
 SAME_AGAIN = 0.5
-"""Log-odds beyond :data:`RETURN`, and ahead of anybody else, at which a newcomer is somebody who was
-here before."""
+"""Log-odds beyond :data:`RETURN`, and ahead of anybody else, at which a newcomer is somebody who
+was here before."""
 REUNION = 1.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place."""
 RECENT = 0.6

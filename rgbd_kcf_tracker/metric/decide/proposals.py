@@ -19,7 +19,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 FloatArray = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -138,7 +138,9 @@ def _split(
     mask &= ~others[top:bottom, left:right]
     if not mask.any():
         return []
-    pieces = cut(depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre)
+    pieces = surfaces_in(
+        depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre
+    )
     found = []
     for i in range(1, len(pieces)):
         area = pieces.pixels[i] * float(pieces.depth[i]) ** 2 / (k.fx * k.fy)

@@ -40,11 +40,11 @@ LEAST_SLICE = 0.004
 LEAST_PIXELS = 30
 """Pixels left of a silhouette without its rim, where colours are mixed with the background's."""
 
-STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.59, 0.03
+STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.61, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
-SUREST_SAME, SUREST_OTHER = 3.5, -4.0
+SUREST_SAME, SUREST_OTHER = 3.0, -4.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
 ONE_SIDE, ALL_SIDES = 0.4, 4
 """Share of :data:`SUREST_OTHER` that a single view can say, for there is another side to everybody;

@@ -91,3 +91,15 @@ def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         cube = np.moveaxis(out, 0, axis)
     result: npt.NDArray[np.float32] = cube.reshape(counts.shape)
     return result
+
+
+def palette() -> npt.NDArray[np.float32]:
+    """A colour for each code, for showing what a histogram holds, ``(CODES, 3)`` BGR 0 to 255."""
+    level = (np.arange(LIGHTNESS) + 0.5) * (_TOP / LIGHTNESS / _STEPS)
+    tint = np.arctanh(2 * (np.arange(TINTS) + 0.5) / TINTS - 1) / STEEPNESS
+    y, red, blue = np.meshgrid(level, tint, tint, indexing='ij')
+    shares = _LUMA[0].astype(np.float64)
+    green = y - shares[0] * blue - shares[2] * red
+    logs = np.stack((green + blue, green, green + red), axis=-1).reshape(CODES, 3)
+    colors: npt.NDArray[np.float32] = np.clip(DARKEST * np.expm1(logs), 0, 255).astype(np.float32)
+    return colors

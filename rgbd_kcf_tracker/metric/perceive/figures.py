@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut
+from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, surfaces_in
 
 FloatArray = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -83,7 +83,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         return []
     # Mostly few pixels stand before the room: only where they are is anything to be cut.
     part = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-    pieces = cut(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
+    pieces = surfaces_in(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
     for members in _joined(scene, pieces, scene.forward[part]):
         boxes = pieces.boxes[members]

@@ -15,7 +15,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
-from rgbd_kcf_tracker.metric.perceive.surfaces import cut, standing
+from rgbd_kcf_tracker.metric.perceive.surfaces import standing, surfaces_in
 
 VIEW_WIDTH = 480
 """Columns in which surfaces are looked for: a mug at two metres is still fifteen wide."""
@@ -83,7 +83,7 @@ def surface_at(frame: Frame, u: float, v: float) -> Box:
 
 def _connected(view: DepthView, mask: npt.NDArray[np.bool_], row: int, column: int) -> Box | None:
     """Box in the colour image of the part of ``mask`` that is connected to a pixel of the view."""
-    surfaces = cut(view.depth, mask, JUMP_M, JUMP_SHARE)
+    surfaces = surfaces_in(view.depth, mask, JUMP_M, JUMP_SHARE)
     row, column = _nearest(surfaces.labels > 0, row, column, NEAREST)
     label = int(surfaces.labels[row, column]) if row >= 0 else 0
     if label == 0 or surfaces.pixels[label] < LEAST_PIXELS:

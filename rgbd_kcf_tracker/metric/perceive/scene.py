@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, cut, standing
+from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, standing, surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 from rgbd_kcf_tracker.pose import Pose
 
@@ -125,7 +125,7 @@ class SceneReader:
         if floor is not None and elevation is not None:
             forward = floor.forward(view.depth, elevation)
         mask = standing(view, elevation, self._floor_margin)
-        surfaces = cut(view.depth, mask, self._jump, self._jump_per_metre)
+        surfaces = surfaces_in(view.depth, mask, self._jump, self._jump_per_metre)
         rim = Rim.of(view)
         self._rim = rim if self._rim is None else rim.common(self._rim)
         image = view_image(frame.color, view.step, view.shape)

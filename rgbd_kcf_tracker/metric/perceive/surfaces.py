@@ -61,7 +61,7 @@ def standing(
     return valid
 
 
-def cut(
+def surfaces_in(
     depth: npt.NDArray[np.float32],
     mask: npt.NDArray[np.bool_],
     jump: float,

@@ -53,7 +53,7 @@ def steady_light(_: float) -> Gain:
 
 
 @dataclass
-class Scene:
+class World:
     """All there is to record.
 
     Attributes:

@@ -3,7 +3,7 @@
 
 """Measure the live node: camera, tracker and listener as processes, and the wire beside them.
 
-    python -m rgbd_kcf_tracker.bench.live --sizes qhd hd --seconds 20
+    python -m rgbd_kcf_tracker.bench.latency --sizes qhd hd --seconds 20
 
 Latency is from the stamp, set just before the images go out, to the answer's arrival at the
 listener. The camera sends to the tracker and to a node that does nothing but answer by turns: what
@@ -234,7 +234,7 @@ def histogram(result: Result) -> str:
 def main(args: list[str] | None = None) -> int:
     """Measure, print the table and the histograms; status 1 where a pair was not answered."""
     parser = argparse.ArgumentParser(
-        prog='python -m rgbd_kcf_tracker.bench.live',
+        prog='python -m rgbd_kcf_tracker.bench.latency',
         description=(__doc__ or '').split('\n')[0],
     )
     parser.add_argument('--variants', nargs='+', choices=VARIANTS, default=[DEFAULT_VARIANT])
