@@ -39,11 +39,13 @@ class Track:
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
             forward, x right, y down); None where depth or intrinsics are unknown.
         id: of the target among several; 0 where there is only one.
-        velocity: ``(x, y, z)`` in metres per second in the same frame; None where unknown.
+        velocity: ``(x, y, z)`` in metres per second over the ground, along the axes of the
+            same frame; of a hidden target the predicted one; None where unknown.
         covariance: of the position or the predicted position, ``(3, 3)`` row by row in square
             metres; None where unknown.
         predicted: where a target that is not seen is believed to be, ``(x, y, z)`` in metres; None
             while it is seen, and where nothing is known.
+        velocity_covariance: of the velocity, ``(3, 3)`` row by row; None where unknown.
     """
 
     box: Box | None
@@ -55,6 +57,7 @@ class Track:
     velocity: tuple[float, float, float] | None = None
     covariance: tuple[float, ...] | None = None
     predicted: tuple[float, float, float] | None = None
+    velocity_covariance: tuple[float, ...] | None = None
 
     @property
     def occluded(self) -> bool:

@@ -69,11 +69,13 @@ class Belief:
         position: metres, the middle of the body.
         velocity: metres per second.
         covariance: of the position, ``(3, 3)`` row by row in square metres.
+        velocity_covariance: likewise of the velocity.
     """
 
     position: tuple[float, float, float]
     velocity: tuple[float, float, float]
     covariance: tuple[float, ...]
+    velocity_covariance: tuple[float, ...]
 
 
 class BySurface:
@@ -223,8 +225,11 @@ class BySurface:
         middle = place + np.array([0.0, self.body.height / 2, 0.0])
         x, y, z = (float(v) for v in middle)
         u, v, w = (float(speed) for speed in self.motion.velocity)
-        covariance = np.diag(np.square(sigma)).ravel()
-        return Belief((x, y, z), (u, v, w), tuple(float(c) for c in covariance))
+        covariance, of_velocity = (
+            tuple(float(c) for c in np.diag(np.square(s)).ravel())
+            for s in (sigma, self.motion.speed_sigma)
+        )
+        return Belief((x, y, z), (u, v, w), covariance, of_velocity)
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""

@@ -262,15 +262,23 @@ class Follower:
         if self._surface is None:
             return Track(None, state)
         belief = self._surface.belief()
-        return Track(None, state, covariance=belief.covariance, predicted=belief.position)
+        return Track(
+            None,
+            state,
+            velocity=belief.velocity,
+            covariance=belief.covariance,
+            predicted=belief.position,
+            velocity_covariance=belief.velocity_covariance,
+        )
 
     def _tracked(self, frame: Frame, box: Box, score: float, depth: float | None) -> Track:
-        position = velocity = covariance = None
+        position = velocity = covariance = velocity_covariance = None
         if depth is not None and frame.intrinsics is not None:
             position = frame.intrinsics.deproject(box.cx, box.cy, depth)
             if self._surface is not None:
                 belief = self._surface.belief()
                 velocity, covariance = belief.velocity, belief.covariance
+                velocity_covariance = belief.velocity_covariance
         return Track(
             box,
             TrackState.TRACKING,
@@ -279,6 +287,7 @@ class Follower:
             position,
             velocity=velocity,
             covariance=covariance,
+            velocity_covariance=velocity_covariance,
         )
 
 
