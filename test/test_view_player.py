@@ -189,6 +189,8 @@ def test_another_target_is_added_where_it_is_picked() -> None:
     later = rig.ask('seek', frame=8)
     assert [t['id'] for t in later['targets']] == [1, 2]
     rig.ask('rename', id=2, name='chair')
+    rig.ask('rename', id=77, name='nobody')
+    assert set(rig.player._names) == {1, 2}
     assert rig.ask('remove', id=1)['targets'][0]['name'] == 'chair'
 
 

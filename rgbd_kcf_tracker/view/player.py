@@ -246,7 +246,8 @@ class Player:
         elif command.do == 'remove':
             self._remove(values['id'])
         elif command.do == 'rename':
-            if values['name']:
+            passed = self._passed.get(self._shown)
+            if values['name'] and passed is not None and values['id'] in passed.tracks:
                 self._names[values['id']] = values['name']
         elif command.do == 'variant':
             if values['name'] not in VARIANTS:
