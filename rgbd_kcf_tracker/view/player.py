@@ -284,7 +284,8 @@ class Player:
             begun = time.monotonic()
             for number in range(self._front + 1, wanted + 1):
                 self._track(number, self._read(number))
-                if time.monotonic() - begun > 0.5:
+                # The last one is shown when its figures are on the board too.
+                if number < wanted and time.monotonic() - begun > 0.5:
                     begun = time.monotonic()
                     self._busy = f'tracking up to frame {wanted}: at {number}'
                     self._shown = number
