@@ -3,8 +3,8 @@
 
 """The page over a running tracker: a node of its own that only listens and asks.
 
-It subscribes to the images while somebody looks and to nothing larger than a box while nobody does,
-in another process than the tracker, which neither waits for it nor knows of it.
+It subscribes to the images while somebody looks and to nothing larger than answers in words while
+nobody does, in another process than the tracker, which neither waits for it nor knows of it.
 """
 
 from __future__ import annotations
