@@ -43,6 +43,8 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 POLL_PERIOD_S = 0.025
 DIAGNOSTICS_PERIOD_S = 1.0
 LOG_PERIOD_S = 5.0
+CATCH_UP = 3
+"""Pairs that wait beside the newest where tracking is fast and was held up: a tenth of a second."""
 
 
 class TrackerNode(LifecycleNode):
@@ -180,7 +182,10 @@ class TrackerNode(LifecycleNode):
                 patient=patient,
             )
             self._worker = Worker(
-                self._processor, self._worker_failed, keep=settings.queue_size if patient else 1
+                self._processor,
+                self._worker_failed,
+                keep=settings.queue_size if patient else 1,
+                catch_up=0 if patient else CATCH_UP,
             )
             self._inputs = Subscriptions(
                 self,
