@@ -87,7 +87,7 @@ class DeferredDepth(NDArrayOperatorsMixin):
         self.dtype = np.dtype(np.float32)
 
     def __len__(self) -> int:
-        return self.shape[0]
+        return int(self.shape[0])
 
     def __getitem__(self, key: Any) -> DepthImage:
         return self._convert(np.asarray(self._values[key]))

@@ -34,8 +34,8 @@ class Evidence:
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
-        emerged: True where the candidate was first seen away from the image's edge: whoever does not
-            come in from there was here before.
+        emerged: True where the candidate was first seen away from the image's edge: whoever does
+            not come in from there was here before.
         look: log-odds of its look by the target's gallery.
         mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
         rival: log-odds that it is somebody else, at least 0.
