@@ -265,12 +265,11 @@ class Follower:
         return Track(None, state, covariance=belief.covariance, predicted=belief.position)
 
     def _tracked(self, frame: Frame, box: Box, score: float, depth: float | None) -> Track:
-        position = velocity = covariance = None
-        if depth is not None and frame.intrinsics is not None:
-            position = frame.intrinsics.deproject(box.cx, box.cy, depth)
-            if self._surface is not None:
-                belief = self._surface.belief()
-                velocity, covariance = belief.velocity, belief.covariance
+        velocity = covariance = None
+        position = frame.position(box, depth)
+        if position is not None and self._surface is not None:
+            belief = self._surface.belief()
+            velocity, covariance = belief.velocity, belief.covariance
         return Track(
             box,
             TrackState.TRACKING,

@@ -163,15 +163,12 @@ class MetricTargets:
                 continue
             seen = account.sights[column].figure.seen
             box = outline_box(account.scene, seen)
-            position = None
-            if frame.intrinsics is not None:
-                position = frame.intrinsics.deproject(box.cx, box.cy, seen.depth)
             tracks[self._name(person)] = Track(
                 box,
                 TrackState.TRACKING,
                 account.probability(row, column),
                 seen.depth,
-                position,
+                frame.position(box, seen.depth),
                 id=self._name(person),
             )
         for person in account.people:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.mcap_writer import types
 from rgbd_kcf_tracker.track import Track
 
@@ -93,14 +94,15 @@ def marker(head: Any, track: Track, intrinsics: Intrinsics | None) -> Any:
 
 
 def camera_info(head: Any, width: int, height: int, intrinsics: Intrinsics) -> Any:
-    """``sensor_msgs/CameraInfo`` of a camera without distortion."""
+    """``sensor_msgs/CameraInfo`` of the camera of images as they are: not rectified any more."""
+    model, coefficients = model_of(intrinsics.lens)
     fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
     return types()['sensor_msgs/msg/CameraInfo'](
         header=head,
         height=height,
         width=width,
-        distortion_model='plumb_bob',
-        d=np.zeros(5),
+        distortion_model=model,
+        d=np.array(coefficients, np.float64),
         k=np.array([fx, 0, cx, 0, fy, cy, 0, 0, 1], np.float64),
         r=np.eye(3).reshape(-1),
         p=np.array([fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0], np.float64),
