@@ -55,7 +55,8 @@ WINDOWS = {
     'binned': ((0, 0, 0, 0), 2),
     'window, binned': ((180, 60, 640, 420), 2),
 }
-BOARD = (0.5, 1.2)
+BOARD = (0.6, 0.7)
+"""Metres: a thing, whose middle is half way down; a person's is higher."""
 AHEAD = 3.0
 PLACES = [(0.7 + 0.05 * i, 0.12, AHEAD) for i in range(4)]
 """Of the board's middle, metres: beside the middle of the picture, where a lens tells."""
@@ -163,9 +164,7 @@ def test_positions_are_within_two_centimetres_at_three_metres(sensor: Sensor) ->
     boxes = [box for _, box in shots]
     exact = [f.position(box, AHEAD) for f, box in zip(frames, boxes, strict=True)]
     assert max(errors(exact)) < CLOSE
-    # a tracker's box ends at a pixel of its view of the depth, which here is a quarter of a sensor
-    pixel = FULL[0] / 240 * AHEAD / P[0, 0]
-    assert max(errors(followed(frames, boxes[0]))) < max(CLOSE, pixel)
+    assert max(errors(followed(frames, boxes[0]))) < CLOSE
 
 
 def test_without_the_rule_they_are_not() -> None:
@@ -203,7 +202,7 @@ def test_a_bag_is_read_by_the_same_rule(kind: str, rectified: bool, tmp_path: Pa
         frames = list(recording.frames())
     assert frames[0].intrinsics is not None
     assert (frames[0].intrinsics.lens is None) == rectified
-    assert max(errors(followed(frames, box))) < 2 * CLOSE
+    assert max(errors(followed(frames, box))) < CLOSE
     with open_recording(path, ReadOptions(rectified='no' if rectified else 'yes')) as recording:
         other = recording.intrinsics
     assert other is not None
@@ -265,7 +264,7 @@ def test_live_messages_are_read_by_the_same_rule() -> None:
             )
         )
     assert not faults
-    assert max(errors(published)) < 2 * CLOSE
+    assert max(errors(published)) < CLOSE
     # the whole sensor's picture is not this camera's
     whole, _ = Sensor('equidistant').shot(PLACES[0], 9)
     capture = Capture(image(10**9, encode_color(whole.color)), None, camera, 10**9)

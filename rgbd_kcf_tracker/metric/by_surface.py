@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.whereabouts import Belief, Whereabouts
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -61,21 +62,6 @@ class Candidate:
     probability: float
 
 
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """Where a target is believed to be, in the camera's optical frame.
-
-    Attributes:
-        position: metres, the middle of the body.
-        velocity: metres per second.
-        covariance: of the position, ``(3, 3)`` row by row in square metres.
-    """
-
-    position: tuple[float, float, float]
-    velocity: tuple[float, float, float]
-    covariance: tuple[float, ...]
-
-
 class BySurface:
     """Follows one target from scene to scene.
 
@@ -106,6 +92,8 @@ class BySurface:
             parameters.speed,
             np.full(3, parameters.acceleration),
         )
+        self._where = Whereabouts()
+        self._where.seen(scene.view, first, placed, self.body)
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
@@ -176,6 +164,7 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
+        self._where.predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
         if following:
             self._cloud = None
         elif self._parameters.use_particles:
@@ -215,16 +204,20 @@ class BySurface:
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
 
-    def belief(self) -> Belief:
+    def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""
-        place, sigma = self.motion.position, self.motion.sigma
-        if self._cloud is not None:
-            place, sigma = self._cloud.mean, self._cloud.spread
-        middle = place + np.array([0.0, self.body.height / 2, 0.0])
-        x, y, z = (float(v) for v in middle)
-        u, v, w = (float(speed) for speed in self.motion.velocity)
-        covariance = np.diag(np.square(sigma)).ravel()
-        return Belief((x, y, z), (u, v, w), tuple(float(c) for c in covariance))
+        return self._where.belief() if self._cloud is None else self._where.hidden(self._cloud)
+
+    def glimpse(self, scene: Scene, found: Candidate) -> Belief | None:
+        """Where a candidate is that may be the target, of which nothing else is known."""
+        where = Whereabouts()
+        where.seen(scene.view, found.seen, found.placed, self.body)
+        return where.belief()
+
+    def drift(self, dt: float) -> None:
+        """Go on by ``dt`` seconds without a picture of depth."""
+        self.motion.predict(dt)
+        self._where.predict(dt)
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
@@ -234,6 +227,7 @@ class BySurface:
             self._parameters.speed,
             np.full(3, self._parameters.acceleration),
         )
+        self._where.forget()
 
     def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
@@ -245,6 +239,7 @@ class BySurface:
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
+        self._where.seen(scene.view, seen, placed, self.body)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
             self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
@@ -264,7 +259,9 @@ class BySurface:
         k, z = view.intrinsics, float(self.motion.position[2])
         x = (box.cx / view.step - k.cx) * z / k.fx
         y = (box.y / view.step - k.cy) * z / k.fy
-        self.motion.correct(np.array([x, y, z]), np.array([0.1, 0.1, 10.0]))
+        place, sigma = np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
+        self.motion.correct(place, sigma)
+        self._where.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
 
     @staticmethod

@@ -20,6 +20,12 @@ from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import Follower
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.whereabouts import (
+    in_metres,
+    row_by_row,
+    sighted,
+    triple,
+)
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
@@ -163,13 +169,15 @@ class MetricTargets:
                 continue
             seen = account.sights[column].figure.seen
             box = outline_box(account.scene, seen)
+            belief = in_metres(sighted(account.scene.view, seen), frame)
             tracks[self._name(person)] = Track(
                 box,
                 TrackState.TRACKING,
                 account.probability(row, column),
                 seen.depth,
-                frame.position(box, seen.depth),
+                None if belief is None else triple(belief.position),
                 id=self._name(person),
+                covariance=None if belief is None else row_by_row(belief.covariance),
             )
         for person in account.people:
             gone = account.time - person.seen_at
