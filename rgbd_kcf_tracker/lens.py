@@ -24,6 +24,8 @@ WRONG = 1e-4
 """Distances on the plane one metre ahead: where the steps may end, and from where on they have
 found nothing (a twentieth of a pixel of a Kinect's colour camera)."""
 NUDGE = 1e-6
+ALONG = (0.25, 0.5, 0.75, 1.0)
+"""Shares of the way to a point at which the model must not have folded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,9 +87,11 @@ class Lens:
                 step = np.column_stack([d * lack[:, 0] - b * lack[:, 1],
                                         a * lack[:, 1] - c * lack[:, 0]])  # fmt: skip
                 found = found + step / area[:, None]
-            a, b, c, d = self._slopes(found)
+            good = np.abs(points - self.bent(found)).max(axis=1) < WRONG
             # Beyond where the model folds back it shows another point at the same place.
-            good = (np.abs(points - self.bent(found)).max(axis=1) < WRONG) & (a * d - b * c > 0)
+            for share in ALONG:
+                a, b, c, d = self._slopes(share * found)
+                good &= a * d - b * c > 0
         return np.where(good[:, None], found, np.nan)
 
     def _guessed(self, points: Points) -> Points:

@@ -9,7 +9,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     with_intrinsics,
     without_depth,
 )
+from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import place_of
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, Truth, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
@@ -40,6 +41,7 @@ from rgbd_kcf_tracker.evaluation.store import (
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
+from rgbd_kcf_tracker.track import Track
 
 
 def _environment_digest() -> str:
@@ -209,7 +211,8 @@ def _run_sequence(job: Job) -> list[Failure]:
         write_json(
             meta_path(target),
             _meta(job, contender, one, restart, opened)
-            | {'image_size': truth.size, 'thumbnail_scale': thumbnails.scale},
+            | {'image_size': truth.size, 'thumbnail_scale': thumbnails.scale}
+            | {'places': _places(one.tracks, truth)},
         )
         write_times(job.folder, contender.name, sequence.name, one.milliseconds)
     return failures
@@ -260,6 +263,12 @@ def _meta(
             'run_overlaps': counted.overlaps.tolist(),
         }
     return meta
+
+
+def _places(tracks: list[Track], truth: Truth) -> list[tuple[float, ...]]:
+    """Places against the truth, from the second frame on."""
+    found = map(place_of, tracks[1:], truth.positions[1:], truth.velocities[1:])
+    return [astuple(place) for place in found if place is not None]
 
 
 def as_asked(

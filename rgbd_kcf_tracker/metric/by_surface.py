@@ -17,9 +17,9 @@ from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, ga
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.metric.identity.middle import Belief, MiddleFilter
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
-from rgbd_kcf_tracker.metric.identity.whereabouts import Belief, Whereabouts
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -92,8 +92,8 @@ class BySurface:
             parameters.speed,
             np.full(3, parameters.acceleration),
         )
-        self._where = Whereabouts()
-        self._where.seen(scene.view, first, placed, self.body)
+        self._middle = MiddleFilter()
+        self._middle.seen(scene.view, first, placed, self.body)
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
@@ -164,7 +164,7 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
-        self._where.predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
+        self._middle.predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
         if following:
             self._cloud = None
         elif self._parameters.use_particles:
@@ -206,18 +206,20 @@ class BySurface:
 
     def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""
-        return self._where.belief() if self._cloud is None else self._where.hidden(self._cloud)
+        if self._cloud is None or self.hidden_for == 0.0:
+            return self._middle.belief()
+        return self._middle.hidden(self._cloud)
 
     def glimpse(self, scene: Scene, found: Candidate) -> Belief | None:
         """Where a candidate is that may be the target, of which nothing else is known."""
-        where = Whereabouts()
-        where.seen(scene.view, found.seen, found.placed, self.body)
-        return where.belief()
+        middle = MiddleFilter()
+        middle.seen(scene.view, found.seen, found.placed, self.body)
+        return middle.belief()
 
     def drift(self, dt: float) -> None:
         """Go on by ``dt`` seconds without a picture of depth."""
         self.motion.predict(dt)
-        self._where.predict(dt)
+        self._middle.predict(dt)
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
@@ -227,7 +229,7 @@ class BySurface:
             self._parameters.speed,
             np.full(3, self._parameters.acceleration),
         )
-        self._where.forget()
+        self._middle.forget()
 
     def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
@@ -239,7 +241,7 @@ class BySurface:
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
-        self._where.seen(scene.view, seen, placed, self.body)
+        self._middle.seen(scene.view, seen, placed, self.body)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
             self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
@@ -261,7 +263,7 @@ class BySurface:
         y = (box.y / view.step - k.cy) * z / k.fy
         place, sigma = np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
         self.motion.correct(place, sigma)
-        self._where.placed(place, sigma)
+        self._middle.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
 
     @staticmethod

@@ -11,13 +11,13 @@ from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.identity.person import Person
-from rgbd_kcf_tracker.metric.identity.whereabouts import (
+from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
     in_metres,
     row_by_row,
     triple,
 )
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene

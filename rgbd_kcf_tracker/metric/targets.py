@@ -19,13 +19,13 @@ from rgbd_kcf_tracker.metric.by_surface import Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import Follower
-from rgbd_kcf_tracker.metric.identity.person import Person
-from rgbd_kcf_tracker.metric.identity.whereabouts import (
+from rgbd_kcf_tracker.metric.identity.middle import (
     in_metres,
     row_by_row,
     sighted,
     triple,
 )
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside

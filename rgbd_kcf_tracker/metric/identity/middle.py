@@ -117,7 +117,7 @@ class Belief:
         return told if all(np.isfinite(n).all() for n in numbers) else None
 
 
-class Whereabouts:
+class MiddleFilter:
     """Follows the middle of one body."""
 
     def __init__(self) -> None:
@@ -219,7 +219,7 @@ def sighted(view: DepthView, seen: Silhouette) -> Belief | None:
     sides, ends = seen.cut.left or seen.cut.right, seen.cut.top or seen.cut.bottom
     place = np.array([(left + right) / 2, top, seen.depth])
     sigma = THING_SIGMA * np.array([seen.width * sides, seen.height * ends, 0.0])
-    where = Whereabouts()
+    where = MiddleFilter()
     where.seen(view, seen, Placed(place, sigma, 1.0), Body(seen))
     return where.belief()
 
