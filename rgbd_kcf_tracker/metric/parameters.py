@@ -75,7 +75,7 @@ class MetricParameters(Parameters):
         maximum=3600.0,
     )
     predict_for: float = parameter(
-        3.0,
+        2.0,
         'Time for which it is said where a hidden target is believed to be.',
         unit='s',
         minimum=0.0,

@@ -52,14 +52,15 @@ THING_SIGMA = 0.25
 """The deviation of the height of another such body, as a share of what was seen."""
 NEAREST, NUDGE = 0.05, 1e-4
 """Metres ahead from which a lens can be taken out, and the slope over which its effect is taken."""
-LASTING = np.array([0.02, 0.045, 0.026])
+LASTING = np.array([0.022, 0.048, 0.027])
 """Metres of the errors that stay: across, down, ahead."""
 FRESH = np.array([0.02, 0.02, 0.015])
 """Metres of the errors that are new after :data:`FRESH_TIME`."""
 FRESH_TIME = 0.1
 """Seconds in which limbs move the outline anew: frames that come faster say no more."""
-OUTLINE = np.array([1.0, 1.0, 0.0])
-"""Of a body that is partly hidden, depth is known as well as of any."""
+OUTLINE = np.array([1.2, 1.0, 0.3])
+"""Shares of the deviations of a part's place (:class:`Placed`) by which the middle of a body that is
+partly hidden is less sure: depth is known nearly as well as of any."""
 LASTING_SPEED = np.array([0.08, 0.06, 0.06])
 """Metres per second that limbs move the outline about a body."""
 WALKING = np.array([0.65, 0.3, 0.65])
@@ -155,6 +156,8 @@ class MiddleFilter:
             middle = _middle(view, seen)
             if not person:
                 down = float(middle[1] - placed.position[1])
+            elif not seen.cut.any:
+                down = PERSON_MIDDLE * seen.height  # who crouches is less high than he is known for
             middle[1] = placed.position[1] + down
             learned = middle - placed.position
             share = 1.0 if self._motion is None else 1 - np.exp(-self._step / SETTLE_TIME)
