@@ -59,11 +59,11 @@ FRESH = np.array([0.02, 0.02, 0.015])
 FRESH_TIME = 0.1
 """Seconds in which limbs move the outline anew: frames that come faster say no more."""
 OUTLINE = np.array([1.2, 1.0, 0.3])
-"""Shares of the deviations of a part's place (:class:`Placed`) by which the middle of a partly hidden
-body is less sure: depth is known nearly as well as of any."""
-LASTING_SPEED = np.array([0.08, 0.06, 0.06])
+"""Shares of the deviations of a part's place (:class:`Placed`) by which the middle of a body that
+is partly hidden is less sure: depth is known nearly as well as of any."""
+LASTING_SPEED = np.array([0.07, 0.055, 0.055])
 """Metres per second that limbs move the outline about a body."""
-WALKING = np.array([0.65, 0.3, 0.65])
+WALKING = np.array([0.58, 0.27, 0.58])
 """Metres per second squared and square root of a hertz: white noise in the acceleration of somebody
 who walks, turns and stops."""
 SETTLE_TIME = 0.5
