@@ -377,6 +377,7 @@ def test_without_the_action_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
     assert follow_node.action_type() is FollowObject
 
 
+@pytest.mark.ros
 def test_the_parameter_file_reaches_the_node_in_any_namespace() -> None:
     rclpy = pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
     for namespace in ('', 'robot'):
