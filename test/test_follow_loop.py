@@ -11,15 +11,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import pytest
 
-from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.simulation import kinect2_intrinsics
 from rgbd_kcf_tracker.simulation.motion import CameraMotion
-from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
+from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 from rgbd_kcf_tracker.simulation.stage import Stage, route
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import create_tracker
@@ -118,32 +119,86 @@ def told(track: Track) -> tuple[float, float, float] | None:
     return track.predicted if track.box is None else track.position
 
 
+@dataclass
+class Ride:
+    """What happened on the way."""
+
+    distances: list[float] = field(default_factory=list)
+    hidden: list[bool] = field(default_factory=list)
+    strangers: list[int] = field(default_factory=list)
+
+    def note(self, moment: SimulatedFrame, box: Box | None) -> None:
+        x, _, z = moment.truth.position
+        self.distances.append(math.hypot(x, z))
+        self.hidden.append(moment.visible is None)
+        if box is not None and moment.visible is not None and not box.intersection(moment.visible):
+            self.strangers.append(len(self.hidden) - 1)
+
+    def went_well(self, robot: Robot) -> None:
+        gone = [i for i in range(1, len(self.hidden)) if self.hidden[i] and not self.hidden[i - 1]]
+        assert len(gone) == 2, gone
+        assert not self.strangers
+        settled = self.distances[int(2.0 * RATE) :]
+        assert min(settled) > DISTANCE - 0.4, min(settled)
+        assert max(settled) < DISTANCE + 0.7, max(settled)
+        assert robot.z > 2.0
+
+
 def test_a_robot_keeps_its_distance_behind_somebody_through_two_occlusions() -> None:
-    robot = Robot()
+    robot, ride = Robot(), Ride()
     sequence = world(robot)
     tracker = create_tracker('metric')
-    distances, hidden, track = [], [], None
+    track: Track | None = None
     for index in range(len(sequence)):
         moment = sequence[index]
-        frame: Frame = replace(moment.frame, pose=robot.pose)
+        frame = replace(moment.frame, pose=robot.pose)
         if track is None:
             assert moment.visible is not None
             track = tracker.start(frame, moment.visible)
         else:
             track = tracker.update(frame)
-        x, _, z = moment.truth.position
-        distances.append(math.hypot(x, z))
-        hidden.append(moment.visible is None)
-        if track.box is not None and not hidden[-1]:
-            shown: Box | None = moment.visible
-            assert shown is not None
-            assert track.box.intersection(shown) > 0, f'a stranger at {index}'
+        ride.note(moment, track.box)
         robot.drive(*velocity(told(track)), 1 / RATE)
-    gone = [i for i in range(1, len(hidden)) if hidden[i] and not hidden[i - 1]]
-    assert len(gone) == 2, gone
-    settled = distances[int(2.0 * RATE) :]
-    assert min(settled) > DISTANCE - 0.4, min(settled)
-    assert max(settled) < DISTANCE + 0.7, max(settled)
-    assert robot.z > 2.0
+    ride.went_well(robot)
     assert track is not None
     assert track.box is not None
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(180)
+def test_the_same_with_the_node_over_dds() -> None:
+    """What drives hears the node alone, which is not told how the camera moves."""
+    pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+    from geometry_msgs.msg import PointStamped
+    from ros_rig import Rig, running_node
+    from sensor_msgs.msg import CameraInfo
+
+    robot, ride = Robot(), Ride()
+    sequence = world(robot)
+    k = sequence.intrinsics
+    rig = Rig()
+    heard: list[Any] = []
+    rig.node.create_subscription(PointStamped, '/tracker/position', heard.append, 10)
+    try:
+        with running_node(rig):
+            info = CameraInfo(header=rig.header(0), width=SIZE[0], height=SIZE[1])
+            info.k = [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0]
+            rig.info.publish(info)
+            for index in range(len(sequence)):
+                moment = sequence[index]
+                depth = moment.frame.depth
+                assert depth is not None
+                if index == 0:
+                    assert moment.visible is not None
+                    rig.send_init(moment.visible)
+                before = len(heard)
+                rig.send_images(3 * index, moment.frame.color, depth)
+                box = rig.box()
+                if box is not None:
+                    rig.wait(lambda before=before: len(heard) > before, what='position')
+                ride.note(moment, box)
+                p = heard[-1].point if box is not None else None
+                robot.drive(*velocity(None if p is None else (p.x, p.y, p.z)), 1 / RATE)
+    finally:
+        rig.close()
+    ride.went_well(robot)
