@@ -31,6 +31,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     without_depth,
 )
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import place_of
+from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, Truth, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
@@ -267,8 +268,16 @@ def _meta(
 
 def _places(tracks: list[Track], truth: Truth) -> list[tuple[float, ...]]:
     """Places against the truth, from the second frame on."""
-    found = map(place_of, tracks[1:], truth.positions[1:], truth.velocities[1:])
-    return [astuple(place) for place in found if place is not None]
+    found, astray = [], False
+    for index in range(1, len(tracks)):
+        box = tracks[index].box
+        if box is not None:
+            true = (truth.visible[index], truth.bodies[index])
+            astray = max((box.iou(b) for b in true if b is not None), default=0.0) < STRANGER_IOU
+        place = place_of(tracks[index], truth.positions[index], truth.velocities[index], astray)
+        if place is not None:
+            found.append(astuple(place))
+    return found
 
 
 def as_asked(

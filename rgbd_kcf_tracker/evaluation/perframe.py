@@ -156,8 +156,8 @@ def _collect_one(
     )
     if meta.get('places'):
         collected.places[contender.name, sequence.name] = [
-            Place(bool(hidden), *(math.nan if v is None else float(v) for v in numbers))
-            for hidden, *numbers in meta['places']
+            Place(bool(hidden), bool(astray), *(math.nan if v is None else v for v in numbers))
+            for hidden, astray, *numbers in meta['places']
         ]
     if 'short_term' in meta:
         run = meta['short_term']

@@ -22,8 +22,9 @@ def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | N
     for tracker in dict.fromkeys(tracker for tracker, _ in places):
         own = [place for (name, _), some in places.items() if name == tracker for place in some]
         for label, kept in (
-            ('seen', [p for p in own if not p.hidden]),
-            ('hidden', [p for p in own if p.hidden]),
+            ('seen', [p for p in own if not p.hidden and not p.astray]),
+            ('hidden', [p for p in own if p.hidden and not p.astray]),
+            ('astray', [p for p in own if p.astray]),
             ('all', own),
         ):
             c = coverage(kept)
@@ -46,6 +47,6 @@ def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | N
         ),
         tuple(rows),
         note='Of the middle of the body, all frames of all sequences with a place and a covariance '
-        'alike, boxes on strangers included. Calibrated covariances hold 95 %. Errors: root mean '
-        'squares.',
+        'alike. Calibrated covariances hold 95 %. Astray: the box, or the last before the target was '
+        'hidden, was on something else. Errors are root mean squares.',
     )  # fmt: skip

@@ -29,6 +29,8 @@ class Place:
 
     Attributes:
         hidden: whether it said so of a target that it did not see.
+        astray: whether the box, or the last before it was hidden, was on something else than the
+            target: no covariance says that.
         error: metres from the true place.
         distance: squared Mahalanobis distance of the true place.
         speed_error: metres per second from the true velocity; NaN where none was said.
@@ -36,6 +38,7 @@ class Place:
     """
 
     hidden: bool
+    astray: bool
     error: float
     distance: float
     speed_error: float = math.nan
@@ -61,17 +64,19 @@ class Coverage:
     speed_error: float
 
 
-def place_of(track: Track, position: Triple | None, velocity: Triple | None) -> Place | None:
+def place_of(
+    track: Track, position: Triple | None, velocity: Triple | None, astray: bool = False
+) -> Place | None:
     """A track against the truth; None where it said no place with a covariance, or none is true."""
     told = track.position if track.box is not None else track.predicted
     if position is None or told is None or track.covariance is None:
         return None
     distance, error = _distance(told, position, track.covariance)
-    place = Place(track.box is None, error, distance)
+    place = Place(track.box is None, astray, error, distance)
     if velocity is None or track.velocity is None or track.velocity_covariance is None:
         return place
     speed_distance, speed_error = _distance(track.velocity, velocity, track.velocity_covariance)
-    return Place(place.hidden, error, distance, speed_error, speed_distance)
+    return Place(place.hidden, astray, error, distance, speed_error, speed_distance)
 
 
 def coverage(places: Sequence[Place]) -> Coverage:

@@ -52,7 +52,7 @@ THING_SIGMA = 0.25
 """The deviation of the height of another such body, as a share of what was seen."""
 NEAREST, NUDGE = 0.05, 1e-4
 """Metres ahead from which a lens can be taken out, and the slope over which its effect is taken."""
-LASTING = np.array([0.022, 0.048, 0.027])
+LASTING = np.array([0.028, 0.05, 0.032])
 """Metres of the errors that stay: across, down, ahead."""
 FRESH = np.array([0.02, 0.02, 0.015])
 """Metres of the errors that are new after :data:`FRESH_TIME`."""
@@ -63,7 +63,7 @@ OUTLINE = np.array([1.2, 1.0, 0.3])
 is partly hidden is less sure: depth is known nearly as well as of any."""
 LASTING_SPEED = np.array([0.07, 0.055, 0.055])
 """Metres per second that limbs move the outline about a body."""
-WALKING = np.array([0.58, 0.27, 0.58])
+WALKING = np.array([0.62, 0.28, 0.62])
 """Metres per second squared and square root of a hertz: white noise in the acceleration of somebody
 who walks, turns and stops."""
 SETTLE_TIME = 0.5
