@@ -268,7 +268,15 @@ def test_what_was_not_said_does_not_count_and_what_is_no_covariance_holds_nothin
     assert math.isnan(coverage([]).inside)
     assert math.isnan(coverage([place]).speed_inside)
     assert places_table({}) is None
-    table = places_table({('a', 's'): [place, Place(False, False, 0.1, LIMIT / 2, 0.2, LIMIT * 2), Place(False, True, 9.0, 99.0)]})
+    table = places_table(
+        {
+            ('a', 's'): [
+                place,
+                Place(False, False, 0.1, LIMIT / 2, 0.2, LIMIT * 2),
+                Place(False, True, 9.0, 99.0),
+            ]
+        }
+    )
     assert table is not None
     assert [row[0] for row in table.rows] == ['a, seen', 'a, hidden', 'a, astray', 'a, all']
     assert table.rows[0][2:] == (100.0, pytest.approx(10.0), 0.0, pytest.approx(20.0))
