@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place, coverage
+from rgbd_kcf_tracker.evaluation.score_tables import scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
-from rgbd_kcf_tracker.evaluation.tables import scaled
 
 
 def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | None:
@@ -47,6 +47,6 @@ def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | N
         ),
         tuple(rows),
         note='Of the middle of the body, all frames of all sequences with a place and a covariance '
-        'alike. Calibrated covariances hold 95 %. Astray: the box, or the last before the target was '
+        'alike. Calibrated covariances hold 95 %. Astray: the box, or the last before it was '
         'hidden, was on something else. Errors are root mean squares.',
     )  # fmt: skip
