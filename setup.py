@@ -112,7 +112,7 @@ setup(
         *FOR_ROS2_RUN,
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
         (f'share/{NAME}', ['package.xml']),
-        shared('config', '*.yaml', '*.xml', '*.rviz'),
+        shared('config', '*.yaml', '*.xml', '*.rviz', '*.json'),
         shared('launch', '*.py', '*.yaml', '*.xml'),
     ],
     python_requires='>=3.10',

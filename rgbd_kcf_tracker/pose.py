@@ -43,6 +43,33 @@ class Pose:
         object.__setattr__(self, 'rotation', rotation)
         object.__setattr__(self, 'translation', translation)
 
+    @classmethod
+    def from_quaternion(
+        cls, quaternion: tuple[float, float, float, float], translation: tuple[float, float, float]
+    ) -> Pose:
+        """The pose that ROS writes as a quaternion ``(x, y, z, w)`` and metres.
+
+        Raises:
+            ParameterError: where the quaternion is not of length 1, as one that was never set is.
+        """
+        from scipy.spatial.transform import Rotation  # it takes as long to load as all else
+
+        length = float(np.linalg.norm(quaternion))
+        if not abs(length - 1.0) < 1e-2:
+            raise ParameterError(
+                f'quaternion {quaternion} has the length {length:g}: a rotation has 1'
+            )
+        matrix = Rotation.from_quat(quaternion).as_matrix()
+        return cls(matrix, np.array(translation, np.float64))
+
+    @property
+    def quaternion(self) -> tuple[float, float, float, float]:
+        """The rotation as ROS writes it: ``(x, y, z, w)``."""
+        from scipy.spatial.transform import Rotation
+
+        x, y, z, w = (float(v) for v in Rotation.from_matrix(self.rotation).as_quat())
+        return x, y, z, w
+
     def after(self, other: Pose) -> Pose:
         """This pose followed by another: of this frame in the one that ``other`` leads to."""
         return Pose(

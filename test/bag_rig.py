@@ -21,7 +21,8 @@ from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.encoding import PackedImage, RawImage, encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.images import metres_from_mm
 from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter
-from rgbd_kcf_tracker.recordings.track_messages import camera_info, header
+from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 
 ROS1 = get_typestore(Stores.ROS1_NOETIC)
 ROS2 = get_typestore(Stores.ROS2_JAZZY)
@@ -62,20 +63,16 @@ def make_frames(count: int = 6, size: tuple[int, int] = SIZE) -> list[Frame]:
     return frames
 
 
+MAKE = TrackMessages(BAG_TYPES)
+header, camera_info = MAKE.header, MAKE.camera_info
+
+
 def image(stamp_ns: int, packed: RawImage | PackedImage, frame_id: str = 'optical') -> Any:
     """The ROS 2 message of an encoded image."""
     head = header(stamp_ns, frame_id)
     if isinstance(packed, PackedImage):
-        return ROS2.types['sensor_msgs/msg/CompressedImage'](head, packed.format, packed.data)
-    return ROS2.types['sensor_msgs/msg/Image'](
-        head,
-        packed.height,
-        packed.width,
-        packed.encoding,
-        packed.is_bigendian,
-        packed.step,
-        packed.data,
-    )
+        return MAKE.compressed_image(head, packed)
+    return MAKE.image(head, packed)
 
 
 def camera_messages(

@@ -201,9 +201,8 @@ class Rig:
         topics = (self.color, self.depth, self.info, self.init, self.init_point)
         self.wait(lambda: all(p.get_subscription_count() for p in topics), 60.0, 'the tracker')
         if tracker is not None:
-            outputs = tracker._outputs
-            heard = (outputs._box, outputs._occluded, outputs._roi, outputs._position)
-            self.wait(lambda: all(p.get_subscription_count() for p in heard), 60.0, 'its answers')
+            outputs, heard = tracker._outputs, ('box', 'occluded', 'roi', 'position')
+            self.wait(lambda: all(map(outputs.wanted, heard)), 60.0, 'its answers')
             return
         name = f'{self.tracker}: tracker'
         self.wait(lambda: any(d.name == name for d in self.diagnostics), 60.0, 'diagnostics')

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bag_rig import Sent, camera_messages, image, write_mcap, write_ros1
+from bag_rig import Sent, camera_info, camera_messages, header, image, write_mcap, write_ros1
 
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ImageError, ParameterError
@@ -32,7 +32,6 @@ from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info, is_rectified
 from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.sequence_writer import SequenceWriter
-from rgbd_kcf_tracker.recordings.track_messages import camera_info, header
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters
 
 RAW, RECT, INFO = '/camera/color/image_raw', '/camera/color/image_rect', '/camera/color/camera_info'
@@ -240,8 +239,8 @@ def test_live_messages_are_read_by_the_same_rule() -> None:
         session,
         SimpleNamespace(
             image_wanted=False,
-            publish=lambda header, track, size: published.append(track.position),
-            publish_extras=lambda *_: None,
+            publish=lambda answer: published.append(answer.track.position),
+            publish_extras=lambda answer: None,
         ),
         Statistics(),
         lambda: 0,

@@ -67,7 +67,7 @@ def test_demo_leaves_what_it_promises(tmp_path: Path) -> None:
     assert page is not None
     assert page.std() > 20
     bag = RawBag(dest / 'tracker.mcap')
-    assert len(bag.topics['/tracker/box']) == len(bag.topics['/tracker/occluded']) == 60
+    assert len(bag.topics['/tracker/box']) == len(bag.topics['/tracker/state']) == 60
     assert list(bag.topics['/tracker/box'].log_ns) == stamps
     bag.close()
 

@@ -160,8 +160,8 @@ def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
     monkeypatch.setattr(Worker.stop, '__defaults__', (0.2,))
     with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
         rig.play(range(3))
-        session, update = node._session, node._session._tracker.update
-        node._session._tracker.update = lambda frame: gate.wait(30) and update(frame)
+        session, update = node._session, node._session._targets.update
+        node._session._targets.update = lambda frame: gate.wait(30) and update(frame)
         rig.send(3)
         time.sleep(0.2)
         assert change(rig, Transition.TRANSITION_DEACTIVATE)
@@ -184,7 +184,9 @@ def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
 def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
     with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
         rig.play(range(2))
-        node._session._tracker.update = lambda frame: time.sleep(0.3) or node._session.track
+        targets = node._session._targets
+        update = targets.update
+        targets.update = lambda frame: time.sleep(0.3) or update(frame)
         rig.send(2)
         time.sleep(0.1)  # in work
         assert set_parameter(rig, 'variant', 'kcf').successful

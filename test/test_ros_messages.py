@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import array
-from types import SimpleNamespace
+import sys
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import cv2
@@ -19,6 +20,7 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from stand_ins import vision_messages
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
@@ -30,14 +32,13 @@ from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.overlay import draw_track
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+from rgbd_kcf_tracker.recordings.whereabouts import Walks
 from rgbd_kcf_tracker.ros.messages import (
+    ROS_TYPES,
+    RosTypes,
     box_from_roi,
-    detections_from_track,
     image_message,
-    marker_from_track,
-    polygon_from_box,
-    position_from_track,
-    roi_from_box,
     stamp_from_ns,
     stamp_to_ns,
 )
@@ -48,6 +49,7 @@ uint32 = st.integers(0, 2**32 - 1)
 pixel = st.floats(-5000, 5000, width=32)
 side = st.floats(0.5, 5000, width=32)
 boxes = st.builds(Box, pixel, pixel, side, side)
+MAKE = TrackMessages(ROS_TYPES)
 HEADER = Header(stamp=stamp_from_ns(1_700_000_000_123_456_789), frame_id='camera')
 
 
@@ -76,7 +78,7 @@ def test_any_region_is_a_box_or_refused(x: int, y: int, width: int, height: int)
 @many
 @given(boxes, st.integers(1, 4000), st.integers(1, 4000))
 def test_any_box_is_a_region_inside_the_image_or_none(box: Box, width: int, height: int) -> None:
-    roi = roi_from_box(box, width, height)
+    roi = MAKE.region(box, width, height)
     inside = box.clipped(width, height)
     if inside is None:
         assert roi is None
@@ -91,12 +93,12 @@ def test_any_box_is_a_region_inside_the_image_or_none(box: Box, width: int, heig
 @many
 @given(boxes)
 def test_a_polygon_is_the_box_again(box: Box) -> None:
-    message = wire(polygon_from_box(HEADER, box))
+    message = wire(MAKE.polygon(HEADER, box))
     assert message.header == HEADER
     assert len(message.polygon.points) == 4
     again = box_from_polygon(message.polygon.points)
     assert np.allclose(again.as_tuple(), box.as_tuple(), atol=2e-3)
-    assert wire(polygon_from_box(HEADER, None)).polygon.points == []
+    assert wire(MAKE.polygon(HEADER, None)).polygon.points == []
 
 
 @many
@@ -104,17 +106,16 @@ def test_a_polygon_is_the_box_again(box: Box) -> None:
     boxes,
     st.one_of(st.none(), st.tuples(*[st.floats() for _ in range(3)])),
     st.floats(0, 1),
-    st.floats(0, 10),
 )
 def test_positions_and_markers_fit_the_wire(
-    box: Box, position: tuple[float, float, float] | None, score: float, lifetime: float
+    box: Box, position: tuple[float, float, float] | None, score: float
 ) -> None:
     track = Track(box, TrackState.TRACKING, score, None, position)
-    point = position_from_track(HEADER, track)
+    where = Walks().update([track], 0, Intrinsics(500, 500, 160, 120)).get(track.id)
+    point = MAKE.position(HEADER, where)
     finite = position is not None and bool(np.all(np.isfinite(position)))
     assert (point is not None) == finite
-    camera = Intrinsics(500, 500, 160, 120)
-    marker = wire(marker_from_track(HEADER, track, camera, lifetime))
+    marker = wire(MAKE.marker(HEADER, where))
     assert marker.action == (Marker.ADD if finite else Marker.DELETE)
     assert marker.header == HEADER
 
@@ -133,43 +134,30 @@ def test_images_there_and_back(shape: tuple[int, ...]) -> None:
         assert np.allclose(metres, depth / 1000)
 
 
-def vision_types() -> SimpleNamespace:
-    """The messages of vision_msgs 4 (Jazzy) in plain Python: it is not on the package index."""
-
-    def fields(**defaults: Any) -> type:
-        def init(self: Any, **values: Any) -> None:
-            for name, make in defaults.items():
-                setattr(self, name, values.pop(name) if name in values else make())
-            assert not values, values
-
-        return type('Message', (), {'__init__': init, '__slots__': tuple(defaults)})
-
-    point2 = fields(x=float, y=float)
-    pose2 = fields(position=point2, theta=float)
-    bbox = fields(center=pose2, size_x=float, size_y=float)
-    hypothesis = fields(class_id=str, score=float)
-    point3 = fields(x=float, y=float, z=float)
-    pose = fields(pose=fields(position=point3))
-    with_pose = fields(hypothesis=hypothesis, pose=pose)
-    return SimpleNamespace(
-        Detection2DArray=fields(header=Header, detections=list),
-        Detection2D=fields(header=Header, results=list, bbox=bbox, id=str),
-        ObjectHypothesisWithPose=with_pose,
-    )
-
-
-def test_detections() -> None:
-    types = vision_types()
-    track = Track(Box(10, 20, 30, 40), TrackState.TRACKING, 0.7, 2.0, (0.1, 0.2, 2.0))
-    message = detections_from_track(types, HEADER, track, 'target')
+def test_detections(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'vision_msgs', ModuleType('vision_msgs'))
+    monkeypatch.setitem(sys.modules, 'vision_msgs.msg', vision_messages())
+    make = TrackMessages(RosTypes())
+    tracks = [
+        Track(Box(10, 20, 30, 40), TrackState.TRACKING, 0.7, 2.0, (0.1, 0.2, 2.0), 3),
+        Track(None, TrackState.OCCLUDED, id=4, predicted=(1.0, 0.0, 3.0)),
+    ]
+    message = make.detections(HEADER, tracks)
     (detection,) = message.detections
     center = detection.bbox.center.position
+    assert detection.id == '3'
     assert (center.x, center.y, detection.bbox.size_x, detection.bbox.size_y) == (25, 40, 30, 40)
     assert detection.results[0].hypothesis.score == 0.7
-    assert detection.results[0].pose.pose.position.z == 2.0
     assert message.header == detection.header == HEADER
-    gone = Track(None, TrackState.OCCLUDED)
-    assert detections_from_track(types, HEADER, gone, 'target').detections == []
+    wheres = Walks().update(tracks, 0, Intrinsics(100, 100, 30, 40))
+    message = make.detections3d(HEADER, wheres.values())
+    (detection,) = message.detections
+    assert detection.id == '3'
+    assert detection.results[0].pose.pose.position.z == 2.0
+    size, center = detection.bbox.size, detection.bbox.center
+    assert (size.x, size.y, size.z) == pytest.approx((0.6, 0.8, 0.5))
+    assert (center.position.x, center.orientation.w) == (0.1, 1.0)
+    assert message.header == detection.header == HEADER
 
 
 @pytest.mark.parametrize('state', list(TrackState))
@@ -186,7 +174,7 @@ def processor(faults: list[str], **options: Any) -> Processor:
     session = Session(DEFAULT_VARIANT, default_parameters(DEFAULT_VARIANT), faults.append)
     session.choose(lambda _: None)
     silent = SimpleNamespace(
-        image_wanted=False, publish=lambda *_: None, publish_extras=lambda *_: None
+        image_wanted=False, publish=lambda _: None, publish_extras=lambda _: None
     )
     return Processor(
         session, silent, Statistics(), lambda: 0, lambda _, text: faults.append(text), **options
@@ -287,14 +275,14 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     faults: list[str] = []
     made = processor(faults)
     answers: list[Track] = []
-    made._publishers.publish = lambda header, track, size: answers.append(track)
+    made._publishers.publish = lambda answer: answers.append(answer.track)
     image = image_message(HEADER, np.zeros((60, 80, 3), np.uint8), 'bgr8')
     made.session.start(Frame(np.zeros((60, 80, 3), np.uint8)), Box(20, 20, 20, 20))
 
     def broken(_: Frame) -> Track:
         raise ZeroDivisionError('broken')
 
-    made.session._tracker = SimpleNamespace(update=broken)
+    made.session._targets.update = broken
     made(Capture(image, None, None, 0))
     assert [track.state for track in answers] == [TrackState.OCCLUDED]
     assert faults == ['internal error: ZeroDivisionError: broken']

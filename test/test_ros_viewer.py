@@ -27,7 +27,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from ros_rig import Rig, overrides, running_node, scene
 
-from rgbd_kcf_tracker import Box
+from rgbd_kcf_tracker import Box, Track, TrackState
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
@@ -127,6 +127,8 @@ def test_a_box_from_the_page_starts_the_tracker_and_is_shown(rig: Rig) -> None:
         assert target['state'] == 'tracking'
         assert Box(*target['box']).iou(scene(rig.index)[2]) > 0.4  # type: ignore[attr-defined]
         assert target['position'] is not None
+        assert 0.5 < target['score'] <= 1
+        assert target['chosen']
         until(rig, lambda: look.headers[-1].get('values', {}).get('acceptance'))
 
         look.ask(do='parameter', name='acceptance', value=0.6)
@@ -137,7 +139,7 @@ def test_a_box_from_the_page_starts_the_tracker_and_is_shown(rig: Rig) -> None:
         look.ask(do='step', by=1)
         until(rig, lambda: any('recordings' in h['word'] for h in look.headers))
 
-        look.ask(do='remove', id=1)
+        look.ask(do='remove', id=target['id'])
         until(rig, lambda: look.headers[-1]['targets'] == [])
         look.ask(do='point', x=box.cx, y=box.cy, frame=0)
         assert node.page.boxes_csv().count('tracking') > 2
@@ -189,18 +191,24 @@ def test_what_a_command_sets() -> None:
 
 def test_states_of_the_answers() -> None:
     page = LivePage('tracker', 10)
-    page.answer(1_000_000_000, None)
-    page.answer(2_000_000_000, Box(0, 0, 5, 5))
-    page.occluded(True)
-    page.answer(3_000_000_000, None)
-    page.figures({'state': 'LOST', 'work_median_ms': 'nan'})
-    page.answer(4_000_000_000, None)
+    box, place = Box(0, 0, 5, 5), (0.1, 0.2, 2.0)
+    other = Track(Box(9, 9, 5, 5), TrackState.TRACKING, 0.5, id=4)
+    page.answer(1_000_000_000, [Track(None, TrackState.IDLE)])
+    page.answer(2_000_000_000, [Track(box, TrackState.TRACKING, 0.75, 2.0, place, 3), other])
+    page.answer(3_000_000_000, [Track(None, TrackState.OCCLUDED, id=3, predicted=place), other])
+    page.figures({'work_median_ms': 'nan'})
+    page.answer(4_000_000_000, [Track(None, TrackState.LOST, id=3)])
     page.board.show({}, {})
     entries = page.board.take((-1, 0))[2]['entries']
-    assert [e['targets'][0][1] if e['targets'] else '' for e in entries] == [
-        '', 'tracking', 'occluded', 'lost',
-    ]  # fmt: skip
+    assert [[t[:3] for t in e['targets']] for e in entries] == [
+        [],
+        [(3, 'tracking', 0.75), (4, 'tracking', 0.5)],
+        [(3, 'occluded', None), (4, 'tracking', 0.5)],
+        [(3, 'lost', None)],
+    ]
     assert [e['t'] for e in entries] == [0, 1, 2, 3]
+    rows = page.boxes_csv().splitlines()
+    assert [row.partition(',')[0] for row in rows] == ['id', '3', '4', '3', '4', '3']
     # A looping bag: stamps go back, and the last minute begins anew.
-    page.answer(500_000_000, None)
+    page.answer(500_000_000, [Track(None, TrackState.IDLE)])
     assert len(page.board.take((-1, 0))[2]['entries']) == 1

@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,6 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+import yaml
 from bag_rig import CAMERA, assert_same_frames, make_frames
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -35,6 +38,7 @@ from rgbd_kcf_tracker.recordings import (
     open_recording,
 )
 from rgbd_kcf_tracker.recordings.encoding import millimetres
+from rgbd_kcf_tracker.recordings.messages import tracks_of_state
 from rgbd_kcf_tracker.track import Track, TrackState
 
 SEEN = Track(Box(10.25, 8.5, 20, 30.125), TrackState.TRACKING, 0.875, 2.5, (0.1, -0.2, 2.5))
@@ -180,6 +184,11 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
         '/tracker/roi': 2,
         '/tracker/position': 2,
         '/tracker/marker': 3,
+        '/tracker/markers': 3,
+        '/tracker/annotations': 3,
+        '/tracker/camera_info': 3,
+        '/tracker/state': 3,
+        '/tracker/pose': 2,
         '/tracker/image_annotated/compressed': 3,
     }
     color = found['/kinect2/hd/image_color_rect'][0]
@@ -203,10 +212,64 @@ def test_bag_holds_the_images_and_the_topics_of_the_tracker(tmp_path: Path) -> N
     assert (marker.action, gone.action) == (0, 2)
     assert marker.scale.x == pytest.approx(20 * 2.5 / CAMERA.fx)
     assert marker.scale.y == pytest.approx(30.125 * 2.5 / CAMERA.fy)
+    ((seen,), (hidden,)) = (tracks_of_state(found['/tracker/state'][i]) for i in (0, 1))
+    assert (seen.state, seen.box, seen.position) == (SEEN.state, SEEN.box, SEEN.position)
+    assert (hidden.state, hidden.box) == (HIDDEN.state, None)
+    overlay, nothing, _ = found['/tracker/annotations']
+    assert [(p.x, p.y) for p in overlay.points[0].points] == [
+        (p.x, p.y) for p in box.polygon.points
+    ]
+    assert overlay.texts[0].text == f'{SEEN.id} tracking {SEEN.score:.2f}'
+    assert not nothing.points
     info = found['/kinect2/hd/camera_info'][0]
+    assert info.k == found['/tracker/camera_info'][0].k
     assert list(info.k) == [60, 0, 31.5, 0, 61, 23.5, 0, 0, 1]
     packed = np.frombuffer(found['/tracker/image_annotated/compressed'][0].data, np.uint8)
     assert cv2.imdecode(packed, cv2.IMREAD_COLOR).shape == (48, 64, 3)
+
+
+def test_bag_brings_the_types_that_ros_does_not_have(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as writer:
+        writer.write_track(make_frames(1)[0], SEEN)
+    with (tmp_path / 'a.mcap').open('rb') as file:
+        summary = make_reader(file).get_summary()
+    schema = next(s for s in summary.schemas.values() if 'ImageAnnotations' in s.name)
+    assert (schema.name, schema.encoding) == ('foxglove_msgs/msg/ImageAnnotations', 'ros2msg')
+    for kind in ('Point2', 'Color', 'PointsAnnotation', 'TextAnnotation', 'CircleAnnotation'):
+        assert f'MSG: foxglove_msgs/{kind}' in schema.data.decode()
+
+
+def test_layout_for_foxglove_shows_what_bags_hold(tmp_path: Path) -> None:
+    """Every topic and path in config/foxglove.json is in a bag of track --bag."""
+    text = (Path(__file__).parent.parent / 'config' / 'foxglove.json').read_text()
+    layout = json.loads(text)
+    frame = make_frames(1)[0]
+    moving = dataclasses.replace(
+        SEEN, velocity=(0.1, 0.0, 0.5), covariance=(1.0,) * 9, velocity_covariance=(1.0,) * 9
+    )
+    with BagWriter(tmp_path / 'a.mcap') as writer:
+        writer.write_frame(frame)
+        writer.write_track(frame, moving)
+    with AnyReader([tmp_path / 'a.mcap']) as bag:
+        kinds = {c.topic: (c, bag.deserialize(raw, c.msgtype)) for c, _, raw in bag.messages()}
+    named = set(re.findall(r'"(/[^"]+)"', text))
+    assert len(named) >= 8
+    for path in named:
+        topic, *fields = path.split('.')
+        message = kinds[topic][1]
+        for name in fields:
+            name, _, index = name.partition('[')
+            message = getattr(message, name)
+            message = message[int(index[:-1])] if index else message
+    panels = set(layout['configById'])
+    assert panels == set(re.findall(r'"(?:first|second)": "([^"]+)"', text))
+
+
+def test_configuration_for_rviz_names_topics_of_the_tracker() -> None:
+    path = Path(__file__).parent.parent / 'config' / 'tracker.rviz'
+    displays = yaml.safe_load(path.read_text())['Visualization Manager']['Displays']
+    topics = {d['Topic']['Value'] for d in displays if 'Topic' in d}
+    assert topics == {'/tracker/image_annotated', '/tracker/markers', '/tracker/pose'}
 
 
 def test_bag_in_metres_keeps_every_depth(tmp_path: Path) -> None:

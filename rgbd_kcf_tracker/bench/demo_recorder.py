@@ -5,31 +5,39 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from contextlib import suppress
 from pathlib import Path
 
 import rclpy
-from geometry_msgs.msg import PointStamped, PolygonStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import (
+    PointStamped,
+    PolygonStamped,
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    TwistWithCovarianceStamped,
+)
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import RegionOfInterest
-from std_msgs.msg import Bool
 
 from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter
-from rgbd_kcf_tracker.recordings.messages import box_from_polygon
-from rgbd_kcf_tracker.ros.messages import stamp_to_ns
-from rgbd_kcf_tracker.track import Track, TrackState
+from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
+from rgbd_kcf_tracker.track import Track
 
 TRACKER = '/tracker'
 _KINDS = {
+    'state': (DiagnosticArray, 'diagnostic_msgs/msg/DiagnosticArray'),
     'box': (PolygonStamped, 'geometry_msgs/msg/PolygonStamped'),
-    'occluded': (Bool, 'std_msgs/msg/Bool'),
-    'roi': (RegionOfInterest, 'sensor_msgs/msg/RegionOfInterest'),
     'position': (PointStamped, 'geometry_msgs/msg/PointStamped'),
+    'pose': (PoseStamped, 'geometry_msgs/msg/PoseStamped'),
+    'pose_with_covariance': (
+        PoseWithCovarianceStamped,
+        'geometry_msgs/msg/PoseWithCovarianceStamped',
+    ),
+    'twist': (TwistWithCovarianceStamped, 'geometry_msgs/msg/TwistWithCovarianceStamped'),
 }
 
 
@@ -63,57 +71,20 @@ class Recorder:
         return len(self._raw['box'])
 
     def tracks(self) -> dict[int, Track]:
-        """The answers by the stamp of their image, as far as the topics tell.
-
-        ``~/occluded`` carries no stamp; it comes once for each ``~/box``, in the same order. The
-        score is NaN, since no topic of the standard messages says it.
-        """
-        boxes = [deserialize_message(raw, PolygonStamped) for raw in self._raw['box']]
-        hidden = [deserialize_message(raw, Bool).data for raw in self._raw['occluded']]
-        hidden += [False] * (len(boxes) - len(hidden))
-        places = {}
-        for raw in self._raw['position']:
-            message = deserialize_message(raw, PointStamped)
-            point = message.point
-            places[stamp_to_ns(message.header.stamp)] = (point.x, point.y, point.z)
-        tracks = {}
-        for message, occluded in zip(boxes, hidden, strict=False):
-            stamp = stamp_to_ns(message.header.stamp)
-            box = box_from_polygon(message.polygon.points)
-            if box is None:
-                state = TrackState.OCCLUDED if occluded else TrackState.IDLE
-                tracks[stamp] = Track(None, state)
-                continue
-            place = places.get(stamp)
-            depth = None if place is None else place[2]
-            tracks[stamp] = Track(box, TrackState.TRACKING, math.nan, depth, place)
-        return tracks
+        """The answers by the stamp of their image."""
+        states = [deserialize_message(raw, DiagnosticArray) for raw in self._raw['state']]
+        return {stamp_of(state): tracks_of_state(state)[0] for state in states}
 
     def write(self, path: Path) -> None:
-        """Write the messages as a bag; those without a stamp get that of the box beside them."""
-        stamps = [
-            stamp_to_ns(deserialize_message(raw, PolygonStamped).header.stamp)
-            for raw in self._raw['box']
+        """Write the messages as a bag, each at its own stamp."""
+        entries = [
+            (stamp_of(deserialize_message(raw, _KINDS[name][0])), name, raw)
+            for name, messages in self._raw.items()
+            for raw in messages
         ]
-        last = stamps[-1] if stamps else 0
-        entries: list[tuple[int, str, bytes]] = []
-        for name, messages in self._raw.items():
-            with_box = iter(self._stamps_with_box(stamps))
-            for index, raw in enumerate(messages):
-                if name == 'roi':
-                    stamp = next(with_box, last)
-                elif name == 'position':
-                    stamp = stamp_to_ns(deserialize_message(raw, PointStamped).header.stamp)
-                else:
-                    stamp = stamps[index] if index < len(stamps) else last
-                entries.append((stamp, name, raw))
         with McapWriter(path, overwrite=True) as bag:
-            for stamp, name, raw in sorted(entries, key=lambda e: (e[0], e[1])):
+            for stamp, name, raw in sorted(entries, key=lambda e: e[:2]):
                 bag.write_raw(f'{TRACKER}/{name}', _KINDS[name][1], bytes(raw), stamp)
-
-    def _stamps_with_box(self, stamps: list[int]) -> list[int]:
-        tracks = self.tracks()
-        return [s for s in stamps if tracks[s].box is not None]
 
     def _spin(self) -> None:
         with suppress(ExternalShutdownException):

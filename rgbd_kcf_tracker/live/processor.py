@@ -17,6 +17,8 @@ from typing import Any, Protocol
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.live.answer import Answer
+from rgbd_kcf_tracker.live.places import CameraPlaces, Places
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
@@ -61,13 +63,11 @@ class Publishers(Protocol):
         """Whether somebody looks at the annotated image."""
         ...
 
-    def publish(self, header: Any, track: Track, size: tuple[int, int] | None) -> None:
-        """The result of a frame with this header; ``size`` is None where it could not be read."""
+    def publish(self, answer: Answer) -> None:
+        """The result of a pair."""
         ...
 
-    def publish_extras(
-        self, header: Any, track: Track, frame: Frame, intrinsics: Intrinsics | None
-    ) -> None:
+    def publish_extras(self, answer: Answer) -> None:
         """What is for people to look at, after the result is out."""
         ...
 
@@ -99,6 +99,7 @@ class Processor:
         now_ns: the node's clock, for the age of a result.
         fault: told of each fault by kind and in words.
         color_transport, depth_transport: how the images are packed.
+        places: where the camera is, None where nobody tells.
         max_pixels: of the largest image that is read.
     """
 
@@ -112,6 +113,7 @@ class Processor:
         *,
         color_transport: str = RAW,
         depth_transport: str = RAW,
+        places: CameraPlaces | None = None,
         max_pixels: int = MAX_PIXELS,
     ) -> None:
         self.session = session
@@ -119,6 +121,7 @@ class Processor:
         self._statistics = statistics
         self._now_ns = now_ns
         self._fault = fault
+        self._places = places
         self._timeline = Timeline()
         self._last: tuple[Capture, int] | None = None
         self._frame_id: str | None = None
@@ -141,23 +144,32 @@ class Processor:
         self._notice(header, moment)
         session, image_wanted = self.session, self._publishers.image_wanted
         frame: Frame | None = None
-        size: tuple[int, int] | None = None
         track = IDLE
+        others: tuple[Track, ...] = ()
+        places = Places()
         decoded = begun
         if session.needs_frame or image_wanted:
             frame = self.frame(capture, moment.time_ns)
             decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
-                size = frame.width, frame.height
+                if self._places is not None:
+                    places = self._places.at(header)
+                    frame = replace(frame, pose=places.fixed)
                 try:
                     track = in_picture(session.process(frame), frame)
+                    others = tuple(in_picture(other, frame) for other in session.others)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
+                if self._places is not None:
+                    places = self._places.judged(places, session.camera_motion)
+                    if places.fixed is None:
+                        frame = replace(frame, pose=None)
         tracked = time.monotonic_ns()
-        self._publishers.publish(header, track, size)
+        answer = Answer(header, track, moment.time_ns, frame, others, places.target)
+        self._publishers.publish(answer)
         published = time.monotonic_ns()
         latency = (self._now_ns() - stamp_of(capture.color)) / 1e6
         work = (published - capture.arrival_ns) / 1e6
@@ -174,16 +186,25 @@ class Processor:
         )
         self._last = capture, moment.time_ns
         if frame is not None:
-            self._publishers.publish_extras(header, track, frame, frame.intrinsics)
+            self._publishers.publish_extras(answer)
 
     def _unseen(self) -> Track:
         """The answer where nothing can be seen: no box, and the target is as it was."""
-        hidden = self.session.track.state is not TrackState.IDLE
-        return Track(None, TrackState.OCCLUDED) if hidden else IDLE
+        last = self.session.track
+        hidden = last.state is not TrackState.IDLE
+        return Track(None, TrackState.OCCLUDED, id=last.id) if hidden else IDLE
 
     def choose(self, choice: Choice, oldest_s: float) -> None:
         """Start on the newest image, or the next one where the newest is old or shows nothing."""
         self.session.choose(choice)
+        self._start_at_once(oldest_s)
+
+    def add(self, choice: Choice, oldest_s: float) -> None:
+        """Likewise for a target beside the others."""
+        self.session.add(choice)
+        self._start_at_once(oldest_s)
+
+    def _start_at_once(self, oldest_s: float) -> None:
         if self._last is None or not self.session.due:
             return
         capture, time_ns = self._last
@@ -246,6 +267,8 @@ class Processor:
         if moment.restarted:
             self._restarts, self._steady = self._restarts + 1, 0
             self._statistics.set('restarts', self._restarts)
+            if self._places is not None:
+                self._places.forget()
             if self.on_restart is not None:
                 self.on_restart()
         if self._frame_id is not None and header.frame_id != self._frame_id:

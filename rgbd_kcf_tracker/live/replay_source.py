@@ -18,20 +18,22 @@ from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.live.replay_message import Message, Role
 from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
-from rgbd_kcf_tracker.recordings import track_messages
 from rgbd_kcf_tracker.recordings.bag_writer import GENERIC
 from rgbd_kcf_tracker.recordings.bags import BagRecording
-from rgbd_kcf_tracker.recordings.encoding import RawImage, encode_color, encode_depth
+from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
+from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 from rgbd_kcf_tracker.recordings.storage import Topic
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.recordings.ros1_translation import Ros1Translator
 
 FOLDER_TOPICS = GENERIC
 """Where the images of a sequence folder go: the tracker's own names, which need no remapping."""
+_MAKE = TrackMessages(BAG_TYPES)
 _IMAGE, _INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
 NEVER_REPLAYED = ('/clock', '/rosout', '/parameter_events')
 
@@ -273,18 +275,18 @@ class _FolderMessages:
                     yield Message(topic, frame.stamp_ns, data, role, frame.stamp_ns)
 
     def _of_frame(self, frame: Frame) -> Iterator[tuple[str, str, Role, Any]]:
-        head = track_messages.header(frame.stamp_ns, FOLDER_TOPICS.frame_id)
+        head = _MAKE.header(frame.stamp_ns, FOLDER_TOPICS.frame_id)
         if frame.intrinsics is not None:
-            info = track_messages.camera_info(head, frame.width, frame.height, frame.intrinsics)
+            info = _MAKE.camera_info(head, frame.width, frame.height, frame.intrinsics)
             yield FOLDER_TOPICS.info, _INFO, Role.OTHER, info
-        yield FOLDER_TOPICS.color, _IMAGE, Role.COLOR, _image(head, encode_color(frame.color))
+        yield FOLDER_TOPICS.color, _IMAGE, Role.COLOR, _MAKE.image(head, encode_color(frame.color))
         if frame.depth is not None:
-            yield FOLDER_TOPICS.depth, _IMAGE, Role.DEPTH, _image(head, encode_depth(frame.depth))
+            yield (
+                FOLDER_TOPICS.depth,
+                _IMAGE,
+                Role.DEPTH,
+                _MAKE.image(head, encode_depth(frame.depth)),
+            )
 
     def close(self) -> None:
         self._recording.close()
-
-
-def _image(head: Any, raw: RawImage) -> Any:
-    fields = (raw.height, raw.width, raw.encoding, raw.is_bigendian, raw.step, raw.data)
-    return typestore(False).types[_IMAGE](head, *fields)

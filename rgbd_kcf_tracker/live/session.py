@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The target and who follows it: what was asked of the tracker, applied at the right frame.
+"""The targets and who follows them: what was asked of the tracker, applied at the right frame.
 
 Plain Python, one thread: the node's worker calls it; tests call it directly.
 """
@@ -9,14 +9,19 @@ Plain Python, one thread: the node's worker calls it; tests call it directly.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.live.story import Story, taken
 from rgbd_kcf_tracker.parameters import Parameters
+from rgbd_kcf_tracker.pose import Pose
+from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import create_tracker
 
@@ -28,6 +33,8 @@ REQUESTS_SHARE = 0.2
 """Share of the time that may go into starting on targets: a storm of requests leaves the rest."""
 REQUESTS_CREDIT_S = 0.3
 """So much of it is saved up: a few requests in a row are met at once."""
+MOST_ADDITIONS = 50
+"""Targets that wait to be added at most."""
 
 
 _warm: set[str] = set()
@@ -50,13 +57,21 @@ def warm_up(variant: str) -> None:
 
 
 class Session:
-    """One tracker, its target, and what waits for the next frame.
+    """The targets, who follows them, and what waits for the next frame.
+
+    One target is the chosen one. Others may be followed beside it: those that were added, and, with
+    :attr:`everyone`, whoever is in view. An id is never given twice while the session lives.
 
     Args:
         variant: name of the tracker.
         parameters: of that variant.
         report: told what went wrong with a request, in words for the user.
         now: the wall clock in seconds, monotonic.
+        tell: told what happened to the targets, in words for the user.
+
+    Attributes:
+        track: of the chosen target.
+        others: tracks of the others.
     """
 
     def __init__(
@@ -65,17 +80,26 @@ class Session:
         parameters: Parameters,
         report: Callable[[str], None],
         now: Callable[[], float] = time.monotonic,
+        tell: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._variant, self._parameters = variant, parameters
         self._wanted = (variant, parameters)
-        self._tracker = create_tracker(variant, parameters)
-        self._report = report
+        self._targets = TargetSet(variant, parameters)
+        self._everyone = False
+        self._chosen: int | None = None
+        self._added: list[int] = []
+        self._ids: dict[int, int] = {}
+        self._last_id = 0
+        self._report, self._tell = report, tell
+        self._story = Story(tell)
         self._choice: Choice | None = None
+        self._additions: deque[Choice] = deque(maxlen=MOST_ADDITIONS)
         self._auto: Choice | None = None
         self._auto_again = False
         self._now = now
         self._credit_s, self._credited = REQUESTS_CREDIT_S, now()
         self.track = IDLE
+        self.others: tuple[Track, ...] = ()
 
     @property
     def variant(self) -> str:
@@ -83,9 +107,19 @@ class Session:
         return self._variant
 
     @property
+    def following(self) -> bool:
+        """Whether anybody is followed."""
+        return self._chosen is not None or bool(self._added) or self._targets.everyone
+
+    @property
+    def camera_motion(self) -> Pose | None:
+        """How the camera seems to have moved in the last frame; None for not at all, or unknown."""
+        return None if self._targets.metric is None else self._targets.metric.camera_motion
+
+    @property
     def needs_frame(self) -> bool:
         """Whether the next frame's pixels matter: a target is followed or to be chosen."""
-        return self.choosing or self.track.state is not TrackState.IDLE
+        return self.choosing or self.following
 
     @property
     def choosing(self) -> bool:
@@ -95,12 +129,14 @@ class Session:
     @property
     def due(self) -> bool:
         """Whether a target was asked for, and its turn has come."""
-        if self._choice is None:
+        if self._choice is None and not self._additions:
             return False
         now = self._now()
         saved = self._credit_s + (now - self._credited) * REQUESTS_SHARE
         self._credit_s, self._credited = min(saved, REQUESTS_CREDIT_S), now
         return self._credit_s > 0
+
+    # -- what is asked ----------------------------------------------------------------------------
 
     def choose_by_itself(self, auto: Choice | None, again: bool = False) -> None:
         """Ask ``auto`` for a target whenever there is none.
@@ -124,73 +160,223 @@ class Session:
         """
         self._choice = choice
 
-    def start_as_asked(self, frame: Frame) -> bool:
-        """Start on this frame, if that was asked; True where there is a new target."""
-        choice = self._choice
-        if not self.due or choice is None:
-            return False
-        self._choice = None
-        begun = self._now()
-        try:
-            box = choice(frame)
-            if box is None:
-                self._choice = choice
-            return box is not None and self.start(frame, box)
-        except RgbdKcfError as error:
-            self._report(str(error))
-            return False
-        finally:
-            self._credit_s -= self._now() - begun
+    def add(self, choice: Choice) -> None:
+        """Follow what ``choice`` finds beside the others; the chosen one where there is none."""
+        if len(self._additions) == MOST_ADDITIONS:
+            self._report(f'{MOST_ADDITIONS} targets wait to be added: the oldest is dropped')
+        self._additions.append(choice)
 
-    def start(self, frame: Frame, box: Box) -> bool:
-        """Take this target; where that fails, the one that is followed is kept, and it is said."""
-        variant, parameters = self._wanted
-        tracker = create_tracker(variant, parameters)
-        try:
-            track = tracker.start(frame, box)
-        except RgbdKcfError as error:
-            self._report(str(error))
-            return False
-        self._variant, self._parameters = variant, parameters
-        self._tracker, self.track = tracker, track
-        return True
+    def remove(self, number: int) -> None:
+        """No longer follow the target of that id."""
+        for inner in (self._chosen, *self._added):
+            if inner is not None and self._ids.get(inner) == number:
+                break
+        else:
+            chosen = (self._chosen, *self._added)
+            known = sorted(self._ids[i] for i in chosen if i is not None)
+            listed = ', '.join(map(str, known)) or 'none'
+            self._report(f'no target {number} was chosen or added: those are {listed}')
+            return
+        self._targets.remove(inner)
+        if inner == self._chosen:
+            self._chosen, self.track = None, IDLE
+            self._story.restart()
+        else:
+            self._added.remove(inner)
+        self.others = tuple(track for track in self.others if track.id != number)
+        self._tell(f'target {number} removed')
+
+    @property
+    def everyone(self) -> bool:
+        """Whether whoever is in view is followed too; only ``metric`` can."""
+        return self._everyone
+
+    @everyone.setter
+    def everyone(self, value: bool) -> None:
+        self._everyone = value
+        self._apply_everyone()
+
+    def _apply_everyone(self) -> None:
+        able = self._targets.metric is not None
+        if self._everyone and not able:
+            self._report(f'variant {self._variant} follows chosen targets only, not everyone')
+        if able:
+            self._targets.everyone = self._everyone
+        if not self._everyone:
+            self.others = tuple(t for t in self.others if t.id in self._known())
+
+    def _known(self) -> set[int]:
+        return {self._ids[i] for i in self._added}
 
     def reset(self) -> None:
-        """Drop the target and whatever was asked."""
+        """Drop all targets and whatever was asked."""
+        if self.track.state is not TrackState.IDLE or self._added:
+            self._tell('all targets dropped' if self._added else 'target dropped')
         self._choice = None
+        self._additions.clear()
+        self._renew()
+
+    def _renew(self) -> None:
+        """Begin anew with what is wanted."""
         self.track = IDLE
-        self._variant, self._parameters = self._wanted
-        self._tracker = create_tracker(*self._wanted)
+        self._replace(TargetSet(*self._wanted))
+        self._story.restart()
 
     def configure(self, variant: str, parameters: Parameters) -> None:
         """Use another tracker or other parameters, as soon as no hidden target would be lost."""
         self._wanted = (variant, parameters)
-        if self.track.state is TrackState.IDLE:
-            choice = self._choice
-            self.reset()
+        if self.track.state is TrackState.IDLE and not self._added:
+            self._renew()
+
+    # -- starting ---------------------------------------------------------------------------------
+
+    def start_as_asked(self, frame: Frame) -> bool:
+        """Start on this frame, if that was asked; True where there is a new chosen target."""
+        if not self.due:
+            return False
+        begun = self._now()
+        try:
+            additions = list(self._additions)
+            self._additions.clear()
+            started = self._chosen_as_asked(frame)
+            for addition in additions:
+                self._added_as_asked(frame, addition)
+            return started
+        finally:
+            self._credit_s -= self._now() - begun
+
+    def _chosen_as_asked(self, frame: Frame) -> bool:
+        choice, self._choice = self._choice, None
+        if choice is None:
+            return False
+        try:
+            box = choice(frame)
+        except RgbdKcfError as error:
+            self._report(str(error))
+            return False
+        if box is None:
             self._choice = choice
+        return box is not None and self.start(frame, box)
+
+    def _added_as_asked(self, frame: Frame, choice: Choice) -> None:
+        try:
+            box = choice(frame)
+            if box is None:
+                self._additions.append(choice)
+            elif self._chosen is None:
+                self.start(frame, box)
+            else:
+                self._add(frame, box)
+        except RgbdKcfError as error:
+            self._report(str(error))
+
+    def _add(self, frame: Frame, box: Box) -> None:
+        inner = self._targets.add(frame, box)
+        track = self._named(self._targets.started(inner))
+        if inner == self._chosen or inner in self._added:
+            self._report(f'what is in that box is followed already, as target {track.id}')
+            return
+        self._added.append(inner)
+        self.others = (*(t for t in self.others if t.id != track.id), track)
+        self._tell(taken(track, 'added'))
+
+    def start(self, frame: Frame, box: Box) -> bool:
+        """Take this target; where that fails, the one that is followed is kept, and it is said.
+
+        Alone, it starts with nothing remembered; among others, with what is known of all.
+        """
+        among = (self._added or self._targets.everyone) and self._current
+        targets = self._targets if among else TargetSet(*self._wanted)
+        try:
+            inner = targets.add(frame, box)
+        except RgbdKcfError as error:
+            self._report(str(error))
+            return False
+        if not among:
+            self._replace(targets)
+        elif self._chosen is not None and self._chosen != inner:
+            self._targets.remove(self._chosen)
+        if inner in self._added:
+            self._added.remove(inner)
+        self._chosen = inner
+        self.track = self._named(targets.started(inner))
+        self.others = tuple(t for t in self.others if t.id != self.track.id)
+        self._tell(taken(self.track))
+        self._story.restart(self.track)
+        return True
+
+    @property
+    def _current(self) -> bool:
+        return self._wanted == (self._variant, self._parameters)
+
+    def _replace(self, targets: TargetSet) -> None:
+        """Go on with another set, in which ids of the last one mean nothing."""
+        if self._variant != self._wanted[0]:
+            self._tell(f'variant {self._wanted[0]} instead of {self._variant}')
+        self._variant, self._parameters = self._wanted
+        self._targets, self._chosen, self._added, self._ids = targets, None, [], {}
+        self.others = ()
+        self._apply_everyone()
+
+    def _named(self, track: Track) -> Track:
+        """The track with an id of the session for that of the set."""
+        if track.id not in self._ids:
+            self._last_id += 1
+            self._ids[track.id] = self._last_id
+        return replace(track, id=self._ids[track.id])
+
+    # -- following --------------------------------------------------------------------------------
 
     def process(self, frame: Frame) -> Track:
-        """Follow the target into the next frame, or start on it."""
+        """Follow the targets into the next frame, or start on it; the chosen one's track."""
+        others = bool(self._added) or self._targets.everyone
+        if others:
+            self._update(frame)
         if self.start_as_asked(frame):
             return self.track
         if self._choice is None and self._auto is not None and self._auto_due():
             found = self._auto(frame)
             if found is not None and self.start(frame, found):
                 return self.track
-        if self.track.state is not TrackState.IDLE:
-            self.track = self._tracker.update(frame)
+        if not others and self.track.state is not TrackState.IDLE:
+            self._update(frame)
+        if self._chosen is not None or self._added:
             self._take_over(frame)
         return self.track
 
+    def _update(self, frame: Frame) -> None:
+        tracks = self._targets.update(frame)
+        chosen = None if self._chosen is None else tracks.pop(self._chosen)
+        self.track = IDLE if chosen is None else self._named(chosen)
+        self.others = tuple(self._named(track) for track in tracks.values())
+        self._story.follow(self.track, frame.stamp_ns)
+
     def _take_over(self, frame: Frame) -> None:
-        box = self.track.box
-        if self._wanted == (self._variant, self._parameters) or box is None:
+        """Go over to what is wanted, with every target that is seen, once the chosen one is."""
+        if self._current:
             return
-        if box.clipped(frame.width, frame.height) is None:
+        if self._chosen is not None and not _shown(self.track, frame):
             return
-        track = self.track
-        if self.start(frame, box):
-            self.track = track
-        else:
+        known = self._known() | {self.track.id}
+        targets = TargetSet(*self._wanted)
+        ids: dict[int, int] = {}
+        try:
+            for track in (self.track, *self.others):
+                if track.id in known and track.box is not None and _shown(track, frame):
+                    ids[targets.add(frame, track.box)] = track.id
+        except RgbdKcfError as error:
+            self._report(str(error))
             self._wanted = (self._variant, self._parameters)
+            return
+        track, others = self.track, self.others
+        chosen = self._chosen is not None
+        self._replace(targets)
+        self._ids = ids
+        inner = list(ids)
+        self._chosen, self._added = (inner[0], inner[1:]) if chosen else (None, inner)
+        self.track, self.others = track, others
+
+
+def _shown(track: Track, frame: Frame) -> bool:
+    """Whether a track has a box that can be started on."""
+    return track.box is not None and track.box.clipped(frame.width, frame.height) is not None

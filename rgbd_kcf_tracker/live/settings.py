@@ -16,12 +16,14 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
 from rgbd_kcf_tracker.recordings import camera_info
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE
+from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 NEWEST, ALL = 'newest', 'all'
 RAW, COMPRESSED, COMPRESSED_DEPTH = 'raw', 'compressed', 'compressedDepth'
 AUTO, BEST_EFFORT, RELIABLE = 'auto', 'best_effort', 'reliable'
 KEEP, RESTART = 'keep', 'restart'
+OFF, TARGET = 'off', 'target'
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,10 @@ class NodeParameters(Parameters):
     auto_init_far: float = parameter(
         4.5, 'Farthest distance at which auto_init looks.', unit='m', minimum=0.2, maximum=20.0
     )
+    follow_everyone: bool = parameter(
+        False,
+        'Follow everyone in view beside the chosen target, each with an id (variant metric).',
+    )
     on_time_jump: str = parameter(
         KEEP,
         'When stamps jump back (a bag that loops): keep the target, or restart from init_box.',
@@ -77,6 +83,42 @@ class NodeParameters(Parameters):
         unit='s',
         minimum=0.0,
         maximum=10.0,
+    )
+    pose_prediction: float = parameter(
+        POSE_PREDICTION_S,
+        'How long ~/pose goes on with where a hidden target is believed to be; 0 for only while it '
+        'is seen.',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
+    )
+    target_frame: str = parameter(
+        '',
+        'Frame in which positions, poses, velocities, markers and 3D detections go out, by TF '
+        "(base_link, map); empty for the camera's own.",
+    )
+    fixed_frame: str = parameter(
+        '',
+        'Frame that does not move, by TF (odom), in which a moving camera keeps the targets in '
+        "mind; empty for what the picture tells of the camera's motion.",
+    )
+    tf_wait: float = parameter(
+        0.1,
+        'How long a pair waits for TF that is a little behind it.',
+        unit='s',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    publish_tf: str = parameter(
+        OFF,
+        'Whom to publish as a TF frame: the chosen target, or all.',
+        choices=(OFF, TARGET, ALL),
+    )
+    tf_name: str = parameter(
+        'target', "Name of the chosen target's TF frame; the others' is it with _<id>."
+    )
+    jpeg_quality: int = parameter(
+        80, 'Quality of ~/image_annotated/compressed.', unit='%', minimum=1, maximum=100
     )
     stale_after: float = parameter(
         2.0,
@@ -146,6 +188,11 @@ READ_ONLY = frozenset(
         'qos_depth',
         'max_pixels',
         'autostart',
+        'target_frame',
+        'fixed_frame',
+        'tf_wait',
+        'publish_tf',
+        'tf_name',
     }
 )
 """Node parameters that are fixed at start: they decide how the node is wired."""

@@ -28,6 +28,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
 
 SHORTEST_STEP = 1e-3
@@ -79,6 +80,14 @@ class MetricTargets:
         number = self._name(follower.person)
         self._followers[number] = follower
         return number
+
+    @property
+    def camera_motion(self) -> Pose | None:
+        """How the camera seems to have moved in the last frame, by the picture, not by its poses.
+
+        The pose of the last frame's camera in that of now; None where nothing tells of a motion.
+        """
+        return self._reader.seems
 
     def remove(self, number: int) -> None:
         """No longer follow the target of that id.

@@ -9,20 +9,22 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings import track_messages as make
 from rgbd_kcf_tracker.recordings.encoding import (
     encode_color,
     encode_compressed_color,
     encode_depth,
 )
-from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter, types
+from rgbd_kcf_tracker.recordings.foxglove import DEFINITIONS, image_annotations
+from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter
+from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES, register
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter
 from rgbd_kcf_tracker.recordings.overlay import draw_track
+from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S, Walks
 from rgbd_kcf_tracker.track import Track
 
 TRUTH_VISIBLE, TRUTH_BODY = '/groundtruth/visible', '/groundtruth/body'
@@ -103,6 +105,10 @@ class BagWriter(FrameWriter):
         self._tracker = tracker.rstrip('/')
         self._depth_encoding = depth_encoding
         self._annotate = annotate
+        register(DEFINITIONS)
+        self._make = TrackMessages(BAG_TYPES)
+        self._walks = Walks()
+        self._markers = TrackMarkers(self._make)
         self._writer = McapWriter(path, compression, overwrite)
         self.output = self._writer.output
 
@@ -110,7 +116,7 @@ class BagWriter(FrameWriter):
         """Write colour, depth where there is, and CameraInfo where intrinsics are known."""
         header = self._header(frame)
         if frame.intrinsics is not None:
-            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            info = self._make.camera_info(header, frame.width, frame.height, frame.intrinsics)
             self._writer.write(self.topics.info, info, frame.stamp_ns)
         self._write_image(self.topics.color, header, frame, encode_color(frame.color))
         if frame.depth is not None:
@@ -119,20 +125,31 @@ class BagWriter(FrameWriter):
         self._writer.flush()
 
     def write_track(self, frame: Frame, track: Track) -> None:
-        """Write what the tracker node publishes: box and occluded; roi, position, marker if any."""
-        header, stamp = self._header(frame), frame.stamp_ns
+        """Write what the tracker node publishes of the target; in space as far as that is known."""
+        header, stamp, make = self._header(frame), frame.stamp_ns, self._make
+        wheres = self._walks.update([track], stamp, frame.intrinsics, frame.pose)
+        where = wheres.get(track.id)
+        self._write_tracker('state', make.state(header, [track]), stamp)
         self._write_tracker('box', make.polygon(header, track.box), stamp)
-        self._write_tracker('occluded', types()['std_msgs/msg/Bool'](track.occluded), stamp)
-        roi = make.region(track, frame.width, frame.height)
-        if roi is not None:
-            self._write_tracker('roi', roi, stamp)
-        point = make.position(header, track)
-        if point is not None:
-            self._write_tracker('position', point, stamp)
-        self._write_tracker('marker', make.marker(header, track, frame.intrinsics), stamp)
+        self._write_tracker('occluded', make.occluded(track), stamp)
+        self._write_tracker('roi', make.region(track.box, frame.width, frame.height), stamp)
+        self._write_tracker('position', make.position(header, where), stamp)
+        self._write_tracker('marker', make.marker(header, where), stamp)
+        overlay = image_annotations(BAG_TYPES, header, [track])
+        self._write_tracker('annotations', overlay, stamp)
+        self._write_tracker('markers', self._markers.array(header, wheres.values()), stamp)
+        if where is not None:
+            if where.hidden_s <= POSE_PREDICTION_S:
+                self._write_tracker('pose', make.pose(header, where), stamp)
+            covariance = make.pose_with_covariance(header, where)
+            self._write_tracker('pose_with_covariance', covariance, stamp)
+            self._write_tracker('twist', make.twist(header, where), stamp)
+        if frame.intrinsics is not None:
+            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            self._write_tracker('camera_info', info, stamp)
         if self._annotate:
             packed = encode_compressed_color(draw_track(frame.color, track), quality=80)
-            image = types()['sensor_msgs/msg/CompressedImage'](header, packed.format, packed.data)
+            image = make.compressed_image(header, packed)
             self._write_tracker('image_annotated/compressed', image, stamp)
         self._writer.flush()
 
@@ -142,8 +159,8 @@ class BagWriter(FrameWriter):
         A message without points says that the target is absent.
         """
         header = self._header(frame)
-        self._writer.write(TRUTH_VISIBLE, make.polygon(header, visible), frame.stamp_ns)
-        self._writer.write(TRUTH_BODY, make.polygon(header, body), frame.stamp_ns)
+        self._writer.write(TRUTH_VISIBLE, self._make.polygon(header, visible), frame.stamp_ns)
+        self._writer.write(TRUTH_BODY, self._make.polygon(header, body), frame.stamp_ns)
         self._writer.flush()
 
     def close(self, whole: bool = True) -> None:
@@ -151,19 +168,12 @@ class BagWriter(FrameWriter):
         self._writer.close(whole)
 
     def _header(self, frame: Frame) -> Any:
-        return make.header(frame.stamp_ns, self.topics.frame_id)
+        return self._make.header(frame.stamp_ns, self.topics.frame_id)
 
-    def _write_tracker(self, name: str, message: Any, stamp: int) -> None:
-        self._writer.write(f'{self._tracker}/{name}', message, stamp)
+    def _write_tracker(self, name: str, message: Any | None, stamp: int) -> None:
+        if message is not None:
+            self._writer.write(f'{self._tracker}/{name}', message, stamp)
 
     def _write_image(self, topic: str, header: Any, frame: Frame, image: Any) -> None:
-        message = types()['sensor_msgs/msg/Image'](
-            header,
-            image.height,
-            image.width,
-            image.encoding,
-            image.is_bigendian,
-            image.step,
-            np.ascontiguousarray(image.data),
-        )
+        message = self._make.image(header, image)
         self._writer.write(topic, message, frame.stamp_ns)

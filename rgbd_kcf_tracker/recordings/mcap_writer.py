@@ -67,7 +67,7 @@ class McapWriter(FrameWriter):
             raise RecordingError(cannot_write(self.path, error)) from None
 
     def write(self, topic: str, message: Any, log_ns: int) -> None:
-        """Write a message of rosbags' ROS 2 typestore (:func:`types`).
+        """Write a message of rosbags' ROS 2 typestore.
 
         Raises:
             RecordingError: where it cannot be written.
@@ -146,11 +146,6 @@ class McapWriter(FrameWriter):
         )
         self._channels[topic] = channel
         return channel
-
-
-def types() -> Any:
-    """Message classes of ROS 2 Jazzy by full name, as rosbags makes them."""
-    return typestore().types
 
 
 def definition_text(kind: str) -> str:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.track import Track, TrackState
 
 
 def box_from_polygon(points: Any) -> Box | None:
@@ -23,7 +25,49 @@ def box_from_polygon(points: Any) -> Box | None:
     return Box(min(xs), min(ys), width, height)
 
 
+BOX_KEYS = ('x', 'y', 'width', 'height')
+POSITION_KEYS = ('position_x', 'position_y', 'position_z')
+PREDICTED_KEY = 'predicted'
+
+
+def tracks_of_state(msg: Any) -> list[Track]:
+    """The targets of a ``~/state``, the chosen one first.
+
+    Raises:
+        RgbdKcfError: where it is no such message.
+    """
+    return [_track_of(status) for status in msg.status]
+
+
+def _track_of(status: Any) -> Track:
+    values = {pair.key: pair.value for pair in status.values}
+    try:
+        box = place = None
+        if BOX_KEYS[0] in values:
+            box = Box(*(float(values[name]) for name in BOX_KEYS))
+        if POSITION_KEYS[0] in values:
+            x, y, z = (float(values[name]) for name in POSITION_KEYS)
+            place = (x, y, z)
+        predicted = values.get(PREDICTED_KEY) == 'true'
+        return Track(
+            box,
+            TrackState(status.message),
+            float(values['score']),
+            None if place is None or predicted else place[2],
+            None if predicted else place,
+            int(values['id']),
+            predicted=place if predicted else None,
+        )
+    except (KeyError, ValueError, RgbdKcfError) as error:
+        raise RgbdKcfError(f'{status.name!r} is no state of a target: {error}') from None
+
+
 def stamp_of(msg: Any) -> int:
     """Nanoseconds of a message's header."""
-    stamp = msg.header.stamp
+    return header_stamp(msg.header)
+
+
+def header_stamp(header: Any) -> int:
+    """Nanoseconds of a header."""
+    stamp = header.stamp
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

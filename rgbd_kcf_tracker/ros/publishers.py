@@ -1,116 +1,195 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Everything the node says of a frame, each message made only if it is due or somebody listens."""
+"""Everything the node says of a frame, each message made only while somebody listens."""
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
 from typing import Any
 
-from geometry_msgs.msg import PointStamped, PolygonStamped
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import Image, RegionOfInterest
-from std_msgs.msg import Bool, Header
-from visualization_msgs.msg import Marker
 
-from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.recordings.overlay import draw_track
-from rgbd_kcf_tracker.ros.messages import (
-    detections_from_track,
-    image_message,
-    marker_from_track,
-    polygon_from_box,
-    position_from_track,
-    roi_from_box,
-)
-from rgbd_kcf_tracker.track import Track
+from rgbd_kcf_tracker.live.answer import Answer
+from rgbd_kcf_tracker.live.settings import ALL, OFF, NodeParameters
+from rgbd_kcf_tracker.recordings.encoding import encode_compressed_color
+from rgbd_kcf_tracker.recordings.foxglove import ANNOTATIONS, image_annotations
+from rgbd_kcf_tracker.recordings.messages import header_stamp
+from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
+from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+from rgbd_kcf_tracker.recordings.whereabouts import Walks
+from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message
+from rgbd_kcf_tracker.ros.transforms import TargetFrames
 
 RESULT_DEPTH = 100
 """History of the result topics: three seconds at 30 Hz for a consumer that pauses."""
 IMAGE_DEPTH = 2
-MARKER_LIFETIME_S = 0.5
-CLASS_ID = 'target'
 NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Each event that somebody could wait for costs the executor some 10 us with each message of any
 topic; the defaults, two for each topic, only log a QoS that does not fit."""
 
-
-def vision_messages() -> Any | None:
-    """The module vision_msgs.msg, None where vision_msgs is not installed."""
-    try:
-        return importlib.import_module('vision_msgs.msg')
-    except ImportError:
-        return None
+TOPICS = {
+    'state': 'diagnostic_msgs/msg/DiagnosticArray',
+    'box': 'geometry_msgs/msg/PolygonStamped',
+    'occluded': 'std_msgs/msg/Bool',
+    'roi': 'sensor_msgs/msg/RegionOfInterest',
+    'position': 'geometry_msgs/msg/PointStamped',
+    'pose': 'geometry_msgs/msg/PoseStamped',
+    'pose_with_covariance': 'geometry_msgs/msg/PoseWithCovarianceStamped',
+    'twist': 'geometry_msgs/msg/TwistWithCovarianceStamped',
+    'marker': 'visualization_msgs/msg/Marker',
+    'markers': 'visualization_msgs/msg/MarkerArray',
+    'camera_info': 'sensor_msgs/msg/CameraInfo',
+}
+DETECTIONS = {
+    'detections': 'vision_msgs/msg/Detection2DArray',
+    'detections3d': 'vision_msgs/msg/Detection3DArray',
+}
+ANNOTATED, COMPRESSED = 'image_annotated', 'image_annotated/compressed'
+PICTURES = {ANNOTATED: 'sensor_msgs/msg/Image', COMPRESSED: 'sensor_msgs/msg/CompressedImage'}
+OVERLAY = {'annotations': ANNOTATIONS}
+IN_PICTURE = {'state', 'box', 'occluded', 'roi', 'camera_info'}
+IN_SPACE = frozenset(TOPICS) - IN_PICTURE | {'detections3d'}
 
 
 class TrackPublishers:
-    """The result topics of a node, silent while it is not active."""
+    """The result topics of a node, silent while it is not active.
 
-    def __init__(self, node: LifecycleNode) -> None:
+    Args:
+        node: whose they are.
+        settings: gives the parameters as they stand: in which frame results go out, how long a
+            prediction is a pose, and who becomes a TF frame.
+
+    Raises:
+        ParameterError: where they need what is not installed.
+    """
+
+    def __init__(self, node: LifecycleNode, settings: Callable[[], NodeParameters]) -> None:
         self._node = node
-        self._vision = vision_messages()
-        results, images = QoSProfile(depth=RESULT_DEPTH), QoSProfile(depth=IMAGE_DEPTH)
-        self._all: list[Any] = []
-
-        def publisher(kind: Any, topic: str, qos: QoSProfile) -> Any:
-            made = node.create_lifecycle_publisher(kind, topic, qos, event_callbacks=NO_EVENTS)
-            self._all.append(made)
-            return made
-
-        self._box = publisher(PolygonStamped, '~/box', results)
-        self._occluded = publisher(Bool, '~/occluded', results)
-        self._roi = publisher(RegionOfInterest, '~/roi', results)
-        self._position = publisher(PointStamped, '~/position', results)
-        self._marker = publisher(Marker, '~/marker', results)
-        self._image = publisher(Image, '~/image_annotated', images)
-        self._detections = (
-            publisher(self._vision.Detection2DArray, '~/detections', results)
-            if self._vision is not None
-            else None
-        )
+        self._settings, fixed = settings, settings()
+        self._frame_id, self._everyones_frames = fixed.target_frame, fixed.publish_tf == ALL
+        self._frames = TargetFrames(node, fixed) if fixed.publish_tf != OFF else None
+        self._make = TrackMessages(ROS_TYPES)
+        self._walks = Walks()
+        self._markers = TrackMarkers(self._make)
         self._marked = False
+        topics = dict.fromkeys(TOPICS, RESULT_DEPTH) | dict.fromkeys(PICTURES, IMAGE_DEPTH)
+        for optional in (DETECTIONS, OVERLAY):
+            package = next(iter(optional.values())).partition('/')[0]
+            if ROS_TYPES.has(package):
+                topics |= dict.fromkeys(optional, RESULT_DEPTH)
+        kinds = TOPICS | DETECTIONS | OVERLAY | PICTURES
+        self._all = {
+            topic: node.create_lifecycle_publisher(
+                ROS_TYPES.type(kinds[topic]),
+                f'~/{topic}',
+                QoSProfile(depth=depth),
+                event_callbacks=NO_EVENTS,
+            )
+            for topic, depth in topics.items()
+        }
+
+    def wanted(self, *topics: str) -> bool:
+        """Whether somebody subscribes to one of these topics."""
+        return any(
+            topic in self._all and self._all[topic].get_subscription_count() for topic in topics
+        )
 
     @property
     def image_wanted(self) -> bool:
         """Whether somebody subscribes to the annotated image."""
-        return bool(self._image.get_subscription_count())
+        return self.wanted(*PICTURES)
 
-    def publish(self, header: Header, track: Track, size: tuple[int, int] | None) -> None:
-        """The result of a frame, ``~/box`` last: who waits for it finds all others sent.
+    def publish(self, answer: Answer) -> None:
+        """The result of a frame, ``~/box`` last: who waits for it finds all others sent."""
+        header, track, frame, make = answer.header, answer.track, answer.frame, self._make
+        if self.wanted('state'):
+            self._send('state', make.state(header, answer.tracks))
+        if self.wanted('occluded'):
+            self._send('occluded', make.occluded(track))
+        if frame is not None and self.wanted('roi'):
+            self._send('roi', make.region(track.box, frame.width, frame.height))
+        if self.wanted('detections'):
+            self._send('detections', make.detections(header, answer.tracks))
+        if self._frames is not None or self.wanted(*IN_SPACE):
+            self._publish_in_space(answer)
+        self._send('box', make.polygon(header, track.box))
 
-        Args:
-            header: of the colour image, copied as it is.
-            track: what the tracker says.
-            size: width and height of the image, None where it could not be read.
-        """
-        self._occluded.publish(Bool(data=track.occluded))
-        if track.box is not None and size is not None:
-            roi = roi_from_box(track.box, *size)
-            if roi is not None:
-                self._roi.publish(roi)
-        position = position_from_track(header, track)
-        if position is not None:
-            self._position.publish(position)
-        if self._detections is not None and self._detections.get_subscription_count():
-            self._detections.publish(detections_from_track(self._vision, header, track, CLASS_ID))
-        self._box.publish(polygon_from_box(header, track.box))
+    def _publish_in_space(self, answer: Answer) -> None:
+        frame, make = answer.frame, self._make
+        wheres = self._walks.update(
+            answer.tracks,
+            answer.time_ns,
+            None if frame is None else frame.intrinsics,
+            None if frame is None else frame.pose,
+        )
+        header = answer.header
+        if self._frame_id not in ('', header.frame_id):
+            if answer.place is None:
+                return  # better nothing than something in a wrong frame
+            header = make.header(header_stamp(header), self._frame_id)
+            wheres = {who: where.seen_from(answer.place) for who, where in wheres.items()}
+        where = wheres.get(answer.track.id)
+        if self.wanted('detections3d'):
+            self._send('detections3d', make.detections3d(header, wheres.values()))
+        if self.wanted('marker') and (where is not None or self._marked):
+            self._send('marker', make.marker(header, where))
+            self._marked = where is not None
+        if self.wanted('markers'):
+            self._send('markers', self._markers.array(header, wheres.values()))
+        near = {
+            who: where
+            for who, where in wheres.items()
+            if where.hidden_s <= self._settings().pose_prediction
+        }
+        if self._frames is not None:
+            if not self._everyones_frames:
+                near = {who: w for who, w in near.items() if who == answer.track.id}
+            self._frames.send(make, header, near.values(), answer.track.id)
+        if where is None:
+            return
+        if self.wanted('position'):
+            self._send('position', make.position(header, where))
+        if self.wanted('pose_with_covariance'):
+            self._send('pose_with_covariance', make.pose_with_covariance(header, where))
+        if self.wanted('twist'):
+            self._send('twist', make.twist(header, where))
+        if self.wanted('pose') and answer.track.id in near:
+            self._send('pose', make.pose(header, where))
 
-    def publish_extras(
-        self, header: Header, track: Track, frame: Frame, intrinsics: Intrinsics | None
-    ) -> None:
+    def publish_extras(self, answer: Answer) -> None:
         """What is for people to look at, after the result is out."""
-        if self._marker.get_subscription_count() and (track.position is not None or self._marked):
-            self._marker.publish(marker_from_track(header, track, intrinsics, MARKER_LIFETIME_S))
-            self._marked = track.position is not None
-        if self.image_wanted:
-            self._image.publish(image_message(header, draw_track(frame.color, track), 'bgr8'))
+        header, frame, make = answer.header, answer.frame, self._make
+        if frame is None:
+            return
+        if self.wanted('annotations'):
+            self._send('annotations', image_annotations(ROS_TYPES, header, answer.tracks))
+        if frame.intrinsics is not None and self.wanted('camera_info'):
+            info = make.camera_info(header, frame.width, frame.height, frame.intrinsics)
+            self._send('camera_info', info)
+        if not self.image_wanted:
+            return
+        if answer.others:
+            tracks = {track.id: track for track in answer.tracks if track.id}
+            picture = draw_tracks(frame.color, tracks)
+        else:
+            picture = draw_track(frame.color, answer.track)
+        if self.wanted(ANNOTATED):
+            self._send(ANNOTATED, image_message(header, picture, 'bgr8'))
+        if self.wanted(COMPRESSED):
+            quality = self._settings().jpeg_quality
+            packed = encode_compressed_color(picture, quality=quality)
+            self._send(COMPRESSED, make.compressed_image(header, packed))
+
+    def _send(self, topic: str, message: Any | None) -> None:
+        if message is not None:
+            self._all[topic].publish(message)
 
     def destroy(self) -> None:
         """Take the topics down."""
-        for made in self._all:
+        for made in self._all.values():
             self._node.destroy_lifecycle_publisher(made)
         self._all.clear()

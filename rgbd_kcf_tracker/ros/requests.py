@@ -8,11 +8,13 @@ What searches the picture for a target is imported when it is first asked for: m
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import PointStamped
 from sensor_msgs.msg import RegionOfInterest
+from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.live.auto_init import AutoInit
 
 CHOICE = 'choice'
+REJECTED = 'rejected_requests'
+"""The kind of fault that a request is which cannot be met."""
 
 
 class Requests:
@@ -47,16 +51,35 @@ class Requests:
     ) -> None:
         self._processor, self._session = processor, processor.session
         self._settings, self._in_worker, self._fault = settings, in_worker, fault
+        self._numbers = itertools.count()
         processor.on_restart = self._on_restart
 
     def init(self, message: RegionOfInterest) -> None:
         """``~/init``: a box in the newest image."""
+        box = self._box('~/init', message)
+        if box is not None:
+            self._choose(lambda _: box)
+
+    def add(self, message: RegionOfInterest) -> None:
+        """``~/add``: a box in the newest image, to be followed beside the others."""
+        box = self._box('~/add', message)
+        if box is not None:
+            oldest_s = self._settings().stale_after
+            # Each counts, not the newest alone.
+            kind = f'add {next(self._numbers)}'
+            self._in_worker(kind, lambda: self._processor.add(lambda _: box, oldest_s))
+
+    def remove(self, message: UInt32) -> None:
+        """``~/remove``: the id of a target that was chosen or added."""
+        number = int(message.data)
+        self._in_worker(f'remove {number}', lambda: self._session.remove(number))
+
+    def _box(self, topic: str, message: RegionOfInterest) -> Box | None:
         try:
-            box = box_from_roi(message)
+            return box_from_roi(message)
         except RgbdKcfError as error:
-            self._fault('rejected_requests', f'~/init: {error}')
-            return
-        self._choose(lambda _: box)
+            self._fault(REJECTED, f'{topic}: {error}')
+            return None
 
     def init_point(self, message: PointStamped) -> None:
         """``~/init_point``: a pixel of the newest image."""

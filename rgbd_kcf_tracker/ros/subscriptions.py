@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
 
@@ -32,7 +33,7 @@ class Subscriptions:
     Args:
         node: whose they are.
         settings: transports and QoS.
-        color, depth, camera_info, init, init_point: called with each message.
+        color, depth, camera_info, init, init_point, add, remove: called with each message.
     """
 
     def __init__(
@@ -45,6 +46,8 @@ class Subscriptions:
         camera_info: Callable[[Any], None],
         init: Callable[[Any], None],
         init_point: Callable[[Any], None],
+        add: Callable[[Any], None],
+        remove: Callable[[Any], None],
     ) -> None:
         self._node = node
         qos = image_qos(settings)
@@ -79,13 +82,18 @@ class Subscriptions:
             qos_overriding_options=overriding,
         )
         self._topics[CAMERA_INFO] = info.topic_name
-        request = node.create_subscription(
-            RegionOfInterest, '~/init', init, REQUEST_DEPTH, event_callbacks=NO_EVENTS
-        )
-        point = node.create_subscription(
-            PointStamped, '~/init_point', init_point, REQUEST_DEPTH, event_callbacks=NO_EVENTS
-        )
-        self._all += [info, request, point]
+        self._all.append(info)
+        for kind, request, callback in (
+            (RegionOfInterest, '~/init', init),
+            (PointStamped, '~/init_point', init_point),
+            (RegionOfInterest, '~/add', add),
+            (UInt32, '~/remove', remove),
+        ):
+            self._all.append(
+                node.create_subscription(
+                    kind, request, callback, REQUEST_DEPTH, event_callbacks=NO_EVENTS
+                )
+            )
 
     def topic(self, name: str) -> str:
         """The full name of an input after remapping."""

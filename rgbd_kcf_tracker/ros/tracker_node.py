@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -29,13 +28,15 @@ from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session, warm_up
 from rgbd_kcf_tracker.live.settings import ALL, NodeParameters
 from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.story import Allowance
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
-from rgbd_kcf_tracker.ros.requests import Requests
+from rgbd_kcf_tracker.ros.requests import REJECTED, Requests
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
+from rgbd_kcf_tracker.ros.transforms import Transforms
 from rgbd_kcf_tracker.track import TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
 
@@ -43,6 +44,8 @@ SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FA
 POLL_PERIOD_S = 0.025
 DIAGNOSTICS_PERIOD_S = 1.0
 LOG_PERIOD_S = 5.0
+MOST_REFUSALS, REFUSALS_A_SECOND = 10, 2.0
+"""Refused requests that are answered on the log at once, and for good."""
 
 
 class TrackerNode(LifecycleNode):
@@ -66,7 +69,9 @@ class TrackerNode(LifecycleNode):
         self._worker: Worker[Capture] | None = None
         self._intake: Intake | None = None
         self._inputs: Subscriptions | None = None
+        self._transforms: Transforms | None = None
         self._reset_service: Any = None
+        self._refusals = Allowance(MOST_REFUSALS, REFUSALS_A_SECOND)
         self._logged: dict[str, float] = {}
         try:
             self._parameters_server = ParameterServer(self, self._parameters_changed)
@@ -134,10 +139,14 @@ class TrackerNode(LifecycleNode):
             self._session = Session(
                 settings.variant,
                 self._parameters_server.variant_parameters(settings.variant),
-                partial(self._fault, 'rejected_requests'),
+                self._refused,
+                tell=self.get_logger().info,
             )
+            self._session.everyone = settings.follow_everyone
             warm_up(settings.variant)
-            self._outputs = TrackPublishers(self)
+            self._outputs = TrackPublishers(self, lambda: self._settings)
+            if settings.target_frame or settings.fixed_frame:
+                self._transforms = Transforms(self, settings, self._fault)
             self._processor = Processor(
                 self._session,
                 self._outputs,
@@ -146,6 +155,7 @@ class TrackerNode(LifecycleNode):
                 self._fault,
                 color_transport=settings.color_transport,
                 depth_transport=settings.depth_transport,
+                places=self._transforms,
                 max_pixels=settings.max_pixels,
             )
             self._requests = Requests(
@@ -190,6 +200,8 @@ class TrackerNode(LifecycleNode):
                 camera_info=self._on_camera_info,
                 init=self._requests.init,
                 init_point=self._requests.init_point,
+                add=self._requests.add,
+                remove=self._requests.remove,
             )
         except Exception as error:  # rclpy would hide it
             self._cannot(f'cannot activate: {error}')
@@ -238,6 +250,9 @@ class TrackerNode(LifecycleNode):
         if self._outputs is not None:
             self._outputs.destroy()
             self._outputs = None
+        if self._transforms is not None:
+            self._transforms.destroy()
+            self._transforms = None
         if self._reset_service is not None:
             self.destroy_service(self._reset_service)
             self._reset_service = None
@@ -297,6 +312,9 @@ class TrackerNode(LifecycleNode):
         if session is not None and any(n == 'variant' or '.' in n for n in names):
             parameters = self._parameters_server.variant_parameters(variant)
             self._in_worker('configure', lambda: session.configure(variant, parameters))
+        if session is not None and 'follow_everyone' in names:
+            wanted = self._settings.follow_everyone
+            self._in_worker('everyone', lambda: setattr(session, 'everyone', wanted))
 
     def _in_worker(self, kind: str, function: Callable[[], None]) -> None:
         if self._worker is not None:
@@ -313,8 +331,17 @@ class TrackerNode(LifecycleNode):
         self.statistics.error('failed_transitions', text)
         self.get_logger().error(text)
 
+    def _refused(self, text: str) -> None:
+        """Count a request that cannot be met, and say it: who asked waits for the answer."""
+        self.statistics.error(REJECTED, text)
+        if self._refusals.allowed():
+            self.get_logger().warning(text)
+
     def _fault(self, kind: str, text: str) -> None:
-        """Count a fault and say it, each kind every few seconds at most."""
+        """Count a fault and say it, each kind every few seconds at most; refusals always."""
+        if kind == REJECTED:
+            self._refused(text)
+            return
         self.statistics.error(kind, text)
         now = time.monotonic()
         if now - self._logged.get(kind, -LOG_PERIOD_S) >= LOG_PERIOD_S:

@@ -10,18 +10,18 @@ in another process than the tracker, which neither waits for it nor knows of it.
 from __future__ import annotations
 
 import queue
+from contextlib import suppress
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped, PolygonStamped
+from geometry_msgs.msg import PointStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
-from std_msgs.msg import Bool
-from std_srvs.srv import Trigger
+from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
@@ -34,7 +34,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_compressed_depth,
     decode_depth,
 )
-from rgbd_kcf_tracker.recordings.messages import box_from_polygon, stamp_of
+from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
@@ -71,13 +71,11 @@ class ViewerNode(Node):
         self._tracker = self.resolve_topic_name(f'{tracker}/box').removesuffix('/box')
         self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
         light = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.create_subscription(Bool, f'{tracker}/occluded', self._on_occluded, light)
-        self.create_subscription(PointStamped, f'{tracker}/position', self._on_position, light)
-        self.create_subscription(PolygonStamped, f'{tracker}/box', self._on_box, light)
+        self.create_subscription(DiagnosticArray, f'{tracker}/state', self._on_state, light)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._init = self.create_publisher(RegionOfInterest, f'{tracker}/init', 10)
         self._init_point = self.create_publisher(PointStamped, f'{tracker}/init_point', 10)
-        self._reset = self.create_client(Trigger, f'{tracker}/reset')
+        self._remove = self.create_publisher(UInt32, f'{tracker}/remove', 10)
         self._remote = AsyncParameterClient(self, tracker)
         self._images: list[Any] = []
         self._depths: dict[int, Any] = {}
@@ -100,19 +98,9 @@ class ViewerNode(Node):
 
     # -- what comes -------------------------------------------------------------------------------
 
-    def _on_occluded(self, message: Bool) -> None:
-        self.page.occluded(bool(message.data))
-
-    def _on_position(self, message: PointStamped) -> None:
-        p = message.point
-        self.page.position(stamp_of(message), (float(p.x), float(p.y), float(p.z)))
-
-    def _on_box(self, message: PolygonStamped) -> None:
-        try:
-            box = box_from_polygon(message.polygon.points)
-        except RgbdKcfError:
-            return
-        self.page.answer(stamp_of(message), box)
+    def _on_state(self, message: DiagnosticArray) -> None:
+        with suppress(RgbdKcfError):  # of somebody else's
+            self.page.answer(stamp_of(message), tracks_of_state(message))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -236,9 +224,11 @@ class ViewerNode(Node):
             message.point.x, message.point.y = values['x'], values['y']
             self._init_point.publish(message)
         elif command.do == 'remove':
-            if not self._reset.service_is_ready():
+            if not self._remove.get_subscription_count():
                 raise ParameterError(f'{self._tracker} does not answer: is it running?')
-            self._reset.call_async(Trigger.Request())
+            if not 0 < values['id'] < 2**32:
+                raise ParameterError(f'there is no target {values["id"]}')
+            self._remove.publish(UInt32(data=values['id']))
         elif command.do in ('variant', 'parameter'):
             name, value = node_parameter(command, self.page.variant)
             self._set([Parameter(name, value=value)])

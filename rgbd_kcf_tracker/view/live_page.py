@@ -9,13 +9,12 @@ import io
 import queue
 import time
 from collections import OrderedDict, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
 from rgbd_kcf_tracker.parameters import Parameters, parameter
 from rgbd_kcf_tracker.recordings.results import HEADER, row
@@ -26,8 +25,6 @@ from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.showing import Detail, Seen, show
 
-TARGET = 1
-"""The node follows one target; this is its id in the page."""
 STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
 """What an answer takes its time for, as the node's diagnostics tell, each a median."""
 _ANSWERS = 64
@@ -76,12 +73,11 @@ class LivePage:
         self.values: dict[str, Any] = {}
         self._title, self._period = title, 1 / rate_hz
         self._detail = detail
-        self._answers: OrderedDict[int, Track] = OrderedDict()
+        self._answers: OrderedDict[int, list[Track]] = OrderedDict()
         self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
         self._count = 0
         self._origin_ns: int | None = None
-        self._hidden = False
-        self._position: tuple[int, tuple[float, float, float]] | None = None
+        self._chosen = 0
         self._figures: dict[str, str] = {}
         self._lately = 0
         self._word = ''
@@ -114,7 +110,7 @@ class LivePage:
         out = io.StringIO()
         out.write(','.join(('id', *HEADER)) + '\n')
         for number, stamp_ns, track in list(self._rows):
-            out.write(f'{TARGET},{row(number, stamp_ns, track)}\n')
+            out.write(f'{track.id},{row(number, stamp_ns, track)}\n')
         return out.getvalue()
 
     def parameters_yaml(self) -> str:
@@ -135,44 +131,30 @@ class LivePage:
 
     # -- what the node says -----------------------------------------------------------------------
 
-    def occluded(self, hidden: bool) -> None:
-        """``~/occluded``, which comes before the box of the same frame."""
-        self._hidden = hidden
-
-    def position(self, stamp_ns: int, place: tuple[float, float, float]) -> None:
-        """``~/position``, likewise."""
-        self._position = (stamp_ns, place)
-
     def figures(self, values: Mapping[str, str]) -> None:
         """What ``/diagnostics`` says of the node."""
         before = _number(self._figures.get('dropped', values.get('dropped')))
         self._lately += max(0, int(_number(values.get('dropped')) - before))
         self._figures = dict(values)
 
-    def answer(self, stamp_ns: int, box: Box | None) -> None:
-        """``~/box``: the answer to a frame is complete."""
-        place = self._position[1] if self._position and self._position[0] == stamp_ns else None
-        state = TrackState.TRACKING
-        if box is None:
-            lost = self._figures.get('state') == 'LOST'
-            hidden = TrackState.LOST if lost else TrackState.OCCLUDED
-            state = hidden if self._hidden else TrackState.IDLE
-        # What the wire does not say is not known: a NaN is no score.
-        track = Track(box, state, float('nan'), None if place is None else place[2], place)
-        self._answers[stamp_ns] = track
+    def answer(self, stamp_ns: int, tracks: Sequence[Track]) -> None:
+        """``~/state``: the targets of one frame, the chosen one first."""
+        followed = [track for track in tracks if track.state is not TrackState.IDLE]
+        self._answers[stamp_ns] = followed
+        self._chosen = tracks[0].id if tracks else 0
         while len(self._answers) > _ANSWERS:
             self._answers.popitem(last=False)
         if self._origin_ns is None or stamp_ns < self._origin_ns:
             self._origin_ns = stamp_ns
             self.board.rewind([])
         self._count += 1
-        if state is not TrackState.IDLE:
-            self._rows.append((self._count - 1, stamp_ns, track))
+        self._rows.extend((self._count - 1, stamp_ns, track) for track in followed)
         entry = {
             't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
-            'targets': []
-            if state is TrackState.IDLE
-            else [(TARGET, state.value, None, 0, None, None, place)],
+            'targets': [
+                (t.id, t.state.value, t.score if t.box else None, 0, None, None, t.position)
+                for t in followed
+            ],
             **{stage: _number(self._figures.get(f'{stage}_median_ms')) for stage in STAGES},
         }
         if self._lately:
@@ -186,10 +168,10 @@ class LivePage:
     def image(self, frame: Frame, stamp_ns: int) -> None:
         """Put up an image with the answer to it, or the last one before."""
         self._shown_at = time.monotonic()
-        track = self._answers.get(stamp_ns)
-        if track is None and self._answers:
-            track = next(reversed(self._answers.values()))
-        tracks = {} if track is None or track.state is TrackState.IDLE else {TARGET: track}
+        answer = self._answers.get(stamp_ns)
+        if answer is None:
+            answer = next(reversed(self._answers.values()), [])
+        tracks = {track.id: track for track in answer}
         origin = stamp_ns if self._origin_ns is None else self._origin_ns
         variant = self.variant
         prefix = f'{variant}.'
@@ -209,7 +191,9 @@ class LivePage:
             status['latency'] = round(_number(self._figures['latency_median_ms']), 1)
         if 'dropped' in self._figures:
             status['dropped'] = int(_number(self._figures['dropped']))
-        header, blobs = show(Seen(frame, tracks, {TARGET: self._name}, status=status), self._detail)
+        names = {who: self._name if who == self._chosen else str(who) for who in tracks}
+        chosen = frozenset({self._chosen})
+        header, blobs = show(Seen(frame, tracks, names, chosen, status=status), self._detail)
         self.board.show(header, blobs)
 
     def say(self, word: str) -> None:

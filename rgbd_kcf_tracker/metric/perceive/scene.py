@@ -105,12 +105,14 @@ class SceneReader:
         self._light = Light()
         self._ego = EgoMotion()
         self._pose: Pose | None = None
+        self.seems: Pose | None = None
         self.room = Room()
         self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
 
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
+        self.seems = None
         view = DepthView.of(frame, self._width)
         if view is None:
             return None
@@ -169,6 +171,7 @@ class SceneReader:
         if before.shape != view.shape:
             before = np.zeros(view.shape, np.bool_)
         seems = self._ego.update(image, view, before)
+        self.seems = seems if isinstance(seems, Pose) else None
         if last is None or now is None:
             return seems
         return last.after(now.inverse)

@@ -1,0 +1,174 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The session behind the node: several targets, ids that last, and what is told of it."""
+
+from __future__ import annotations
+
+from people_rig import BLUE, GREEN, Someone, picture
+
+from rgbd_kcf_tracker import Box, Track, TrackState
+from rgbd_kcf_tracker.live.session import Session
+from rgbd_kcf_tracker.live.story import Allowance, Story
+from rgbd_kcf_tracker.variants import default_parameters
+
+FIRST, SECOND, THIRD = Someone(-1.0, 3.0), Someone(0.2, 3.5, GREEN), Someone(1.2, 3.2, BLUE)
+ALL = [FIRST, SECOND, THIRD]
+
+
+def session(variant: str = 'metric') -> tuple[Session, list[str], list[str]]:
+    refused: list[str] = []
+    told: list[str] = []
+    made = Session(variant, default_parameters(variant), refused.append, tell=told.append)
+    return made, refused, told
+
+
+def run(made: Session, first: int, count: int, people: list[Someone] | None = None) -> None:
+    for number in range(first, first + count):
+        made.process(picture(people if people is not None else ALL, number / 10))
+
+
+def ids(made: Session) -> list[int]:
+    return sorted(track.id for track in (made.track, *made.others) if track.id)
+
+
+def test_targets_are_added_and_removed_beside_the_chosen_one() -> None:
+    for variant in ('metric', 'kcf'):
+        made, refused, told = session(variant)
+        made.choose(lambda _: FIRST.box)
+        run(made, 0, 2)
+        assert (made.track.id, made.others) == (1, ())
+        made.add(lambda _: SECOND.box)
+        made.add(lambda _: THIRD.box)
+        run(made, 2, 3)
+        assert ids(made) == [1, 2, 3]
+        boxes = {track.id: track.box for track in made.others}
+        assert boxes[2].iou(SECOND.box) > 0.6
+        assert boxes[3].iou(THIRD.box) > 0.6
+        made.remove(2)
+        made.remove(7)
+        run(made, 5, 2)
+        assert ids(made) == [1, 3]
+        assert refused == ['no target 7 was chosen or added: those are 1, 3']
+        made.remove(1)
+        run(made, 7, 1)
+        assert (made.track.state, ids(made)) == (TrackState.IDLE, [3])
+        made.reset()
+        assert not made.following
+        assert [words.split(':')[0] for words in told] == [
+            'target 1 taken', 'target 2 added', 'target 3 added',
+            'target 2 removed', 'target 1 removed', 'all targets dropped',
+        ]  # fmt: skip
+
+
+def test_the_first_that_is_added_is_the_chosen_one() -> None:
+    made, _, _ = session()
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 1)
+    assert made.track.box is not None
+    assert made.others == ()
+
+
+def test_who_is_followed_already_is_not_added_again() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    run(made, 0, 3)
+    made.add(lambda _: FIRST.box)
+    run(made, 3, 2)
+    assert ids(made) == [1]
+    assert refused == ['what is in that box is followed already, as target 1']
+
+
+def test_another_target_has_another_id_and_ids_outlive_resets() -> None:
+    made, _, _ = session()
+    for number, person in enumerate(ALL, 1):
+        made.choose(lambda _, person=person: person.box)
+        run(made, number, 1)
+        assert made.track.id == number
+    made.reset()
+    made.choose(lambda _: FIRST.box)
+    run(made, 9, 1)
+    assert made.track.id == 4
+
+
+def test_everyone_is_followed_beside_the_chosen_one() -> None:
+    made, refused, _ = session()
+    made.everyone = True
+    assert made.needs_frame
+    run(made, 0, 3, [])
+    run(made, 3, 6)
+    assert made.track.state is TrackState.IDLE
+    assert len(made.others) == 3
+    known = {track.id: track.box for track in made.others}
+    made.choose(lambda _: SECOND.box)
+    run(made, 9, 3)
+    assert made.track.box.iou(SECOND.box) > 0.6
+    assert known[made.track.id].iou(SECOND.box) > 0.6  # the same id as before it was chosen
+    assert ids(made) == sorted(known)
+    made.everyone = False
+    assert made.others == ()
+    run(made, 12, 1)
+    assert ids(made) == [made.track.id]
+    assert not refused
+
+
+def test_everyone_is_refused_where_the_variant_cannot() -> None:
+    made, refused, _ = session('kcf')
+    made.everyone = True
+    assert refused == ['variant kcf follows chosen targets only, not everyone']
+    made.configure('metric', default_parameters('metric'))
+    assert made.needs_frame
+
+
+def test_ids_stay_when_the_variant_changes() -> None:
+    made, _, told = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 3)
+    made.configure('kcf', default_parameters('kcf'))
+    run(made, 3, 3)
+    assert made.variant == 'kcf'
+    assert made.track.box.iou(FIRST.box) > 0.5
+    assert ids(made) == [1, 2]
+    assert told[-1] == 'variant kcf instead of metric'
+    assert made.others[0].box.iou(SECOND.box) > 0.5
+
+
+def test_a_bad_box_to_add_is_refused_and_the_rest_goes_on() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: Box(5000, 0, 10, 10))
+    run(made, 0, 2)
+    assert ids(made) == [1]
+    assert len(refused) == 1
+    assert 'lies outside' in refused[0]
+    assert not made.choosing
+
+
+# -- the story ------------------------------------------------------------------------------------
+
+
+def test_turns_are_told_once_and_flicker_is_not() -> None:
+    told: list[str] = []
+    story = Story(told.append)
+    seen = Track(Box(1, 2, 3, 4), TrackState.TRACKING, 1.0, 2.34, id=5)
+    hidden, lost = (Track(None, state, id=5) for state in (TrackState.OCCLUDED, TrackState.LOST))
+    story.restart(seen)
+    moments = [seen, hidden] * 5 + [seen] * 10 + [hidden] * 60 + [lost] * 30 + [seen] * 30
+    for number, track in enumerate(moments):
+        story.follow(track, number * 33_000_000)
+    assert told == [
+        'target 5 occluded',
+        'target 5 lost: searched for everywhere',
+        'target 5 found again, 2.3 m away',
+    ]
+
+
+def test_an_allowance_lets_some_through_at_once_and_then_a_trickle() -> None:
+    clock = [0.0]
+    allowance = Allowance(10, 2.0, lambda: clock[0])
+    assert [allowance.allowed() for _ in range(12)] == [True] * 10 + [False] * 2
+    clock[0] += 0.6
+    assert [allowance.allowed() for _ in range(2)] == [True, False]
+    clock[0] += 1000
+    assert sum(allowance.allowed() for _ in range(100)) == 10

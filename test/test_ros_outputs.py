@@ -1,0 +1,262 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the node says beyond the box: state, pose, velocity, markers, over real DDS."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator
+from types import ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import (
+    PoseStamped,
+    PoseWithCovarianceStamped,
+    TwistWithCovarianceStamped,
+)
+from rclpy.lifecycle import LifecycleNode
+from ros_rig import Rig, running_node, scene, tracker_process
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import CameraInfo, CompressedImage, RegionOfInterest
+from stand_ins import foxglove_messages, vision_messages
+from std_msgs.msg import UInt32
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from rgbd_kcf_tracker import Box, RgbdKcfError, TrackState
+from rgbd_kcf_tracker.recordings.images import decode_compressed_color
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_state
+from rgbd_kcf_tracker.ros.messages import RosTypes, stamp_to_ns
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    made = Rig()
+    yield made
+    made.close()
+
+
+def box_text(index: int = 0) -> str:
+    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
+
+
+def listen(rig: Rig, kind: Any, topic: str) -> list[Any]:
+    """Messages of one of the tracker's topics; to be called before the tracker is up."""
+    heard: list[Any] = []
+    rig.node.create_subscription(kind, f'{rig.tracker}/{topic}', heard.append, 200)
+    return heard
+
+
+def play_hidden(rig: Rig, indices: range) -> None:
+    """The scene's target behind a panel that stands nearer."""
+    for index in indices:
+        color, depth, box = scene(index)
+        x, y = int(box.x) - 40, int(box.y) - 40
+        color[y : y + 160, x : x + 120] = (40, 90, 140)
+        depth[y : y + 160, x : x + 120] = 1000
+        rig.send_info(index)
+        rig.send_images(index, color, depth / 1000)
+
+
+def test_one_stamped_answer_for_each_pair(rig: Rig) -> None:
+    """State, box and position of a moment in one message, with the image's own header."""
+    states = listen(rig, DiagnosticArray, 'state')
+    with running_node(rig, queue_policy='all', init_box=box_text(2)) as node:
+        rig.wait(lambda: node._outputs.wanted('state'))
+        rig.play(range(2, 8))
+        play_hidden(rig, range(8, 30))
+        node._session.reset()
+        rig.play([30])
+        rig.wait(lambda: len(states) == len(rig.boxes))
+    tracks = [tracks_of_state(state) for state in states]
+    assert all(len(each) == 1 for each in tracks)
+    assert [state.header for state in states] == [box.header for box in rig.boxes]
+    for (track,), box, occluded in zip(tracks, rig.boxes, rig.occluded, strict=True):
+        assert track.box == box_from_polygon(box.polygon.points)
+        assert track.occluded == occluded
+    ((seen,), (hidden,), (idle,)) = tracks[5], tracks[-2], tracks[-1]
+    assert seen.state is TrackState.TRACKING
+    assert 0.5 < seen.score <= 1
+    at = next(p.point for p in rig.positions if p.header == states[5].header)
+    assert seen.position == pytest.approx((at.x, at.y, at.z), abs=1e-3)
+    assert states[5].status[0].name == 'target'
+    assert hidden.state in (TrackState.OCCLUDED, TrackState.LOST)
+    assert hidden.predicted is not None
+    assert (idle.state, idle.box, idle.position) == (TrackState.IDLE, None, None)
+
+
+@pytest.mark.parametrize(
+    ('message', 'values'),
+    [
+        ('somewhere', {'id': '1', 'score': '0.5'}),
+        ('tracking', {'id': '1'}),
+        ('tracking', {'id': 'one', 'score': '0.5'}),
+        ('tracking', {'id': '1', 'score': '0.5', 'x': '1', 'y': '2', 'width': '3'}),
+        ('tracking', {'id': '1', 'score': '1', 'x': '1', 'y': '2', 'width': '-3', 'height': '4'}),
+    ],
+)
+def test_what_is_no_state_is_refused(message: str, values: dict[str, str]) -> None:
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    state = DiagnosticArray(status=[DiagnosticStatus(name='a', message=message, values=pairs)])
+    with pytest.raises(RgbdKcfError, match="'a' is no state of a target"):
+        tracks_of_state(state)
+
+
+def test_pose_and_twist_follow_the_walk_and_go_on_while_hidden(rig: Rig) -> None:
+    poses = listen(rig, PoseStamped, 'pose')
+    uncertain = listen(rig, PoseWithCovarianceStamped, 'pose_with_covariance')
+    twists = listen(rig, TwistWithCovarianceStamped, 'twist')
+    with running_node(rig, queue_policy='all', init_box=box_text(), pose_prediction=0.3) as node:
+        rig.wait(lambda: node._outputs.wanted('pose') and node._outputs.wanted('twist'))
+        rig.play(range(15))
+        assert len(poses) >= 14
+        assert poses[-1].header == rig.boxes[-1].header
+        at, turn = poses[-1].pose.position, poses[-1].pose.orientation
+        assert at == rig.positions[-1].point
+        axes = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+        assert axes[:, 2] == pytest.approx((0, -1, 0), abs=1e-6)
+        assert axes[0, 0] > 0.9  # it sways to the right
+        linear = twists[-1].twist.twist.linear
+        assert linear.x == pytest.approx(50 / 15 * 30 * 2 / 290 * np.cos(14 / 15), rel=0.5)
+        seen = np.trace(np.reshape(uncertain[-1].pose.covariance, (6, 6))[:3, :3])
+        play_hidden(rig, range(15, 45))
+        rig.wait(
+            lambda: (
+                stamp_to_ns(uncertain[-1].header.stamp) == stamp_to_ns(rig.boxes[-1].header.stamp)
+            )
+        )
+        assert rig.occluded[-1]
+        hidden = np.trace(np.reshape(uncertain[-1].pose.covariance, (6, 6))[:3, :3])
+        assert hidden > seen
+        last = stamp_to_ns(rig.positions[-1].header.stamp)
+        after = [stamp_to_ns(p.header.stamp) - last for p in poses]
+        assert 0 < max(after) <= 0.3e9
+        assert stamp_to_ns(twists[-1].header.stamp) - last > 0.5e9
+
+
+def test_markers_show_every_target_and_go_with_it(rig: Rig) -> None:
+    arrays = listen(rig, MarkerArray, 'markers')
+    states = listen(rig, DiagnosticArray, 'state')
+    add = rig.node.create_publisher(RegionOfInterest, '/tracker/add', 10)
+    remove = rig.node.create_publisher(UInt32, '/tracker/remove', 10)
+    with running_node(rig, queue_policy='all', init_box=box_text()) as node:
+        rig.wait(lambda: node._outputs.wanted('markers') and node._outputs.wanted('state'))
+        rig.wait(lambda: add.get_subscription_count() and remove.get_subscription_count())
+        rig.play(range(10))
+        add.publish(RegionOfInterest(x_offset=240, y_offset=60, width=60, height=60))
+        rig.wait(lambda: len(node._session.others) == 1)
+        rig.play(range(10, 14))
+        remove.publish(UInt32(data=2))
+        rig.wait(lambda: not node._session.others)
+        rig.play(range(14, 16))
+        rig.wait(lambda: arrays[-1].markers[0].header == rig.boxes[-1].header)
+    assert [status.name for status in states[13].status] == ['target', 'target_2']
+    assert [status.name for status in states[-1].status] == ['target']
+    first = {marker.ns: marker for marker in arrays[9].markers}
+    assert set(first) == {'box', 'name', 'trail', 'velocity', 'covariance'}
+    assert {marker.id for marker in arrays[9].markers} == {1}
+    assert first['box'].type == Marker.CUBE
+    assert first['name'].text == '1 tracking'
+    assert first['trail'].type == Marker.LINE_STRIP
+    assert len(first['trail'].points) >= 3
+    assert first['velocity'].points[1].x > first['velocity'].points[0].x
+    assert first['covariance'].type == Marker.SPHERE
+    assert all(m.lifetime.nanosec for m in arrays[9].markers)
+    both = {marker.id for marker in arrays[13].markers}
+    assert both == {1, 2}
+    assert any(m.id == 2 and m.action == Marker.DELETE for m in arrays[14].markers)
+    assert {marker.id for marker in arrays[15].markers} == {1}
+
+
+def test_the_log_says_what_happens_and_answers_every_wrong_request(rig: Rig) -> None:
+    with tracker_process('-p', 'queue_policy:=all', '-p', f'init_box:={box_text()}') as process:
+        rig.await_listener()
+        rig.play(range(10))
+        play_hidden(rig, range(10, 40))
+        rig.play(range(40, 60))
+        for x in (1000, 2000, 3000):
+            rig.send_init(Box(x, 10, 30, 40))
+            rejected = f'{x // 1000}'
+            rig.wait(lambda n=rejected: rig.values().get('rejected_requests') == n)
+        rig.node.create_client(Trigger, '/tracker/reset').call_async(Trigger.Request())
+        rig.wait(lambda: rig.values()['state'] == 'IDLE')
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=30)[0]
+    lines = [line.partition('[tracker]: ')[2] for line in said.splitlines()]
+    x, y, width, height = (f'{v:.0f}' for v in scene(0)[2].as_tuple())
+    assert f'target 1 taken: box {x},{y},{width},{height}, 2.0 m away' in lines
+    assert 'target 1 occluded' in lines
+    assert 'target 1 found again, 2.0 m away' in lines
+    assert 'target dropped' in lines
+    for x in (1000, 2000, 3000):
+        assert sum(f'box {x},10,30,40 lies outside' in line for line in lines) == 1
+    assert len(lines) < 20
+
+
+def test_pictures_are_made_while_somebody_looks(rig: Rig) -> None:
+    with running_node(rig, queue_policy='all', init_box=box_text(), jpeg_quality=60) as node:
+        rig.play(range(2))
+        assert not node._outputs.image_wanted
+        packed = listen(rig, CompressedImage, 'image_annotated/compressed')
+        cameras = listen(rig, CameraInfo, 'camera_info')
+        rig.wait(lambda: node._outputs.wanted('image_annotated/compressed', 'camera_info'))
+        rig.wait(lambda: node._outputs.image_wanted and node._outputs.wanted('camera_info'))
+        assert not node._outputs.wanted('image_annotated')
+        rig.play(range(2, 6))
+        rig.wait(lambda: packed and packed[-1].header == rig.boxes[-1].header)
+    drawn = decode_compressed_color(packed[-1])
+    plain = scene(5)[0]
+    assert drawn.shape == plain.shape
+    assert packed[-1].format == 'bgr8; jpeg compressed bgr8'
+    outside = np.abs(drawn[150:].astype(int) - plain[150:]).mean()
+    assert 0 < outside < 12
+    assert len(packed[-1].data) < plain.size / 4
+    assert cameras[-1].header == packed[-1].header
+    assert (cameras[-1].width, cameras[-1].k[0]) == (320, 290.0)
+
+
+def test_foxglove_and_vision_messages_where_they_are_installed(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Messages of packages that are not here, as the node would send them."""
+    sent: dict[str, list[Any]] = {}
+    original = LifecycleNode.create_lifecycle_publisher
+
+    def create(node: Any, kind: Any, topic: str, *rest: Any, **named: Any) -> Any:
+        if kind.__module__.startswith('stand_ins'):
+            kept = sent.setdefault(topic, [])
+            return SimpleNamespace(publish=kept.append, get_subscription_count=lambda: 1)
+        return original(node, kind, topic, *rest, **named)
+
+    monkeypatch.setattr(LifecycleNode, 'create_lifecycle_publisher', create)
+    monkeypatch.setattr(LifecycleNode, 'destroy_lifecycle_publisher', lambda *_: None)
+    for name, module in (
+        ('vision_msgs', vision_messages()),
+        ('foxglove_msgs', foxglove_messages()),
+    ):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+        monkeypatch.setitem(sys.modules, f'{name}.msg', module)
+    monkeypatch.setattr('rgbd_kcf_tracker.ros.publishers.ROS_TYPES', RosTypes())
+    with running_node(rig, queue_policy='all', init_box=box_text()):
+        rig.play(range(4))
+        rig.wait(lambda: len(sent['~/annotations']) == 4)
+    (flat,) = sent['~/detections'][-1].detections
+    (solid,) = sent['~/detections3d'][-1].detections
+    overlay = sent['~/annotations'][-1]
+    box, at = rig.box(), rig.positions[-1].point
+    assert flat.id == solid.id == '1'
+    assert flat.bbox.center.position.x == pytest.approx(box.cx, abs=0.01)
+    assert solid.bbox.center.position == at
+    assert np.reshape(solid.results[0].pose.covariance, (6, 6))[0, 0] > 0
+    assert overlay.points[0].points[0].x == pytest.approx(box.x, abs=0.01)
+    assert overlay.points[0].type == 2
