@@ -8,6 +8,8 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Iterator
+from importlib import import_module
+from importlib.util import find_spec
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -260,3 +262,37 @@ def test_foxglove_and_vision_messages_where_they_are_installed(
     assert np.reshape(solid.results[0].pose.covariance, (6, 6))[0, 0] > 0
     assert overlay.points[0].points[0].x == pytest.approx(box.x, abs=0.01)
     assert overlay.points[0].type == 2
+
+
+@pytest.mark.skipif(find_spec('vision_msgs') is None, reason='vision_msgs is not installed')
+def test_detections_over_the_wire(rig: Rig) -> None:
+    types = import_module('vision_msgs.msg')
+    flat = listen(rig, types.Detection2DArray, 'detections')
+    solid = listen(rig, types.Detection3DArray, 'detections3d')
+    with running_node(rig, queue_policy='all', init_box=box_text()) as node:
+        rig.wait(
+            lambda: node._outputs.wanted('detections') and node._outputs.wanted('detections3d')
+        )
+        rig.play(range(4))
+        play_hidden(rig, range(4, 12))
+        rig.wait(lambda: len(flat) == len(solid) == len(rig.boxes))
+    (detection,) = flat[3].detections
+    (body,) = solid[3].detections
+    at = next(p.point for p in rig.positions if p.header == flat[3].header)
+    assert detection.id == body.id == '1'
+    assert detection.bbox.size_x == pytest.approx(rig.box(3).width, abs=0.01)
+    assert body.bbox.center.position == body.results[0].pose.pose.position == at
+    assert body.bbox.size.y == pytest.approx(60 * 2 / 290, rel=0.3)
+    assert len(flat[-1].detections) == len(solid[-1].detections) == 0
+
+
+@pytest.mark.skipif(find_spec('foxglove_msgs') is None, reason='foxglove_msgs is not installed')
+def test_annotations_over_the_wire(rig: Rig) -> None:
+    heard = listen(rig, import_module('foxglove_msgs.msg').ImageAnnotations, 'annotations')
+    with running_node(rig, queue_policy='all', init_box=box_text()) as node:
+        rig.wait(lambda: node._outputs.wanted('annotations'))
+        rig.play(range(4))
+        rig.wait(lambda: len(heard) == 4)
+    corner = heard[-1].points[0].points[0]
+    assert (corner.x, corner.y) == pytest.approx((rig.box().x, rig.box().y), abs=0.01)
+    assert heard[-1].texts[0].text.startswith('1 tracking')
