@@ -74,7 +74,10 @@ FOR_ROS2_RUN = (
     [
         (
             f'lib/{NAME}',
-            [f'resource/lib/{name}' for name in ('tracker', 'replay', 'viewer', 'rgbd-kcf')],
+            [
+                f'resource/lib/{name}'
+                for name in ('tracker', 'replay', 'viewer', 'follow', 'rgbd-kcf')
+            ],
         )
     ]
     if 'bdist_wheel' in sys.argv
@@ -144,6 +147,7 @@ setup(
             'tracker = rgbd_kcf_tracker.ros.tracker_main:main',
             'replay = rgbd_kcf_tracker.ros.replay_main:main',
             'viewer = rgbd_kcf_tracker.ros.viewer_main:main',
+            'follow = rgbd_kcf_tracker.ros.follow_main:main',
         ],
     },
 )

@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ImageError
-from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 
 
@@ -79,3 +80,14 @@ class Frame:
             most: for a pause or a clock that jumped.
         """
         return min(max((self.stamp_ns - stamp_ns) * 1e-9, least), most)
+
+    def position(self, box: Box, depth: float | None) -> tuple[float, float, float] | None:
+        """Metres in the camera's frame of the middle of a box at a depth.
+
+        None where the depth is None, the camera is unknown, or its lens shows nothing there.
+        """
+        if depth is None or self.intrinsics is None:
+            return None
+        # A box counts pixels by their edges, a camera by their middles.
+        place = self.intrinsics.deproject(box.cx - 0.5, box.cy - 0.5, depth)
+        return place if all(math.isfinite(v) for v in place) else None

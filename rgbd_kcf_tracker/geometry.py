@@ -6,9 +6,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+
+TYPE_CHECKING = False  # that of typing costs an import
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.lens import Lens
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +112,14 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A pinhole camera without distortion: focal lengths and principal point in pixels.
+    """A pinhole camera: focal lengths and principal point in pixels, and its lens.
 
-    The camera frame is the optical one of REP-103: z forward, x right, y down.
+    The camera frame is the optical one of REP-103: z forward, x right, y down. What looks at
+    surfaces may leave the lens out; what tells a position in metres must not.
+
+    Attributes:
+        fx, fy, cx, cy: pixels; pixel 0 has its middle at 0.
+        lens: of a picture that was not rectified; None for one without distortion.
 
     Raises:
         ParameterError: where a value is not finite or a focal length is not positive.
@@ -120,6 +129,7 @@ class Intrinsics:
     fy: float
     cx: float
     cy: float
+    lens: Lens | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         for name in ('fx', 'fy', 'cx', 'cy'):
@@ -140,8 +150,15 @@ class Intrinsics:
 
     def project(self, x: float, y: float, z: float) -> tuple[float, float]:
         """Pixel of a point in metres, ``z > 0``."""
-        return self.fx * x / z + self.cx, self.fy * y / z + self.cy
+        across, down = x / z, y / z
+        if self.lens is not None:
+            across, down = (float(v) for v in self.lens.bent([(across, down)])[0])
+        return self.fx * across + self.cx, self.fy * down + self.cy
 
     def deproject(self, u: float, v: float, z: float) -> tuple[float, float, float]:
-        """Point in metres of pixel ``u, v`` at depth ``z``."""
-        return (u - self.cx) * z / self.fx, (v - self.cy) * z / self.fy, z
+        """Point in metres of pixel ``u, v`` at depth ``z``; NaN where the lens shows nothing."""
+        if self.lens is None:
+            return (u - self.cx) * z / self.fx, (v - self.cy) * z / self.fy, z
+        shown = (u - self.cx) / self.fx, (v - self.cy) / self.fy
+        across, down = (float(value) for value in self.lens.straightened([shown])[0])
+        return across * z, down * z, z

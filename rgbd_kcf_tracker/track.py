@@ -37,15 +37,18 @@ class Track:
         score: how sure the tracker is that ``box`` is right, 0 to 1; 0 without a box.
         depth: distance of the target along the optical axis in metres; None where unknown.
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
-            forward, x right, y down); None where depth or intrinsics are unknown.
+            forward, x right, y down); None where depth or intrinsics are unknown. ``metric`` gives
+            the middle of the body, half its thickness behind the surface that is seen, the thesis's
+            variants the surface at the middle of the box.
         id: of the target among several; 0 where there is only one.
-        velocity: ``(x, y, z)`` in metres per second over the ground, along the axes of the
-            same frame; of a hidden target the predicted one; None where unknown.
+        velocity: ``(x, y, z)`` over the ground in metres per second in the same frame; None where
+            unknown.
         covariance: of the position or the predicted position, ``(3, 3)`` row by row in square
-            metres; None where unknown.
-        predicted: where a target that is not seen is believed to be, ``(x, y, z)`` in metres; None
-            while it is seen, and where nothing is known.
-        velocity_covariance: of the velocity, ``(3, 3)`` row by row; None where unknown.
+            metres, positive definite; None where unknown.
+        predicted: where the middle of a target that is not seen is believed to be, ``(x, y, z)`` in
+            metres; None while it is seen, and where nothing is known, or not any more.
+        velocity_covariance: ``(3, 3)`` row by row in square metres per square second; None where
+            the velocity is.
     """
 
     box: Box | None

@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.simulation import simulate
 
 ROOT = Path(__file__).resolve().parent.parent
 NAME = 'rgbd_kcf_tracker'
-EXECUTABLES = ('rgbd-kcf', 'replay', 'viewer', 'tracker')
+EXECUTABLES = ('rgbd-kcf', 'replay', 'viewer', 'follow', 'tracker')
 NOT_ON_A_ROBOT = (
     *('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'),
     *('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil'),

@@ -25,7 +25,8 @@ SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
 # not know of it, but for SIDEWAYS.
 LAYERS = (
     ('errors', 'lazy'),
-    ('extras', 'parameters', 'geometry', 'pose'),
+    ('extras', 'parameters', 'lens', 'pose'),
+    ('geometry',),
     ('frame',),
     ('track',),
     ('features',),
@@ -56,7 +57,7 @@ ROS_MODULES = {
     'lifecycle_msgs', 'rosgraph_msgs', 'rcl_interfaces', 'builtin_interfaces',
 }  # fmt: skip
 LEAN = {
-    'errors', 'lazy', 'parameters', 'geometry', 'frame', 'track',
+    'errors', 'lazy', 'parameters', 'lens', 'geometry', 'frame', 'track',
     'features', 'metric', 'thesis', 'variants', 'targets',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.

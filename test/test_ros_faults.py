@@ -429,6 +429,18 @@ def test_camera_info_that_is_no_camera(live: Live) -> None:
     live.goes_on(first)
 
 
+def test_camera_info_of_a_lens_that_is_not_known(live: Live) -> None:
+    first = live.begin()
+    rig = live.rig
+    info = CameraInfo(header=rig.header(first), width=WIDTH, height=HEIGHT)
+    info.k = [300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0]
+    info.distortion_model, info.d = 'thin_prism', [0.1] * 6
+    rig.info.publish(info)
+    rig.wait(lambda: live.added('bad_camera_info') == 1)
+    live.says('bad_camera_info', "the model 'thin_prism', which is not known: use rectified images")
+    live.goes_on(first)
+
+
 def test_requests_at_any_rate(live: Live) -> None:
     first = live.begin()
     rig, since = live.rig, len(live.rig.boxes)

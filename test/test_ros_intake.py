@@ -16,11 +16,11 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.live.intake import Intake
-from rgbd_kcf_tracker.live.processor import Camera
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.timeline import Timeline
 from rgbd_kcf_tracker.live.worker import Worker
+from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 MS = 1_000_000

@@ -25,11 +25,12 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
-from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor, in_picture
+from rgbd_kcf_tracker.live.processor import Capture, Processor, in_picture
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
-from rgbd_kcf_tracker.recordings.messages import box_from_polygon, intrinsics_from_info
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Walks
@@ -264,10 +265,10 @@ def test_any_pair_of_compressed_images_is_a_frame_or_a_fault(
 def test_any_camera_info_is_a_camera_or_refused(values: list[float], width: int) -> None:
     info = wire(CameraInfo(header=HEADER, width=width, k=values))
     try:
-        camera = intrinsics_from_info(info)
+        camera = camera_from_info(info)
     except RgbdKcfError:
         return
-    assert camera is None or (camera.fx > 0 and camera.fy > 0)
+    assert camera is None or (camera.intrinsics.fx > 0 and camera.intrinsics.fy > 0)
 
 
 def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:

@@ -362,7 +362,7 @@ OUTPUT_FAULTS: dict[str, Fault] = {
 
 READING_OPTIONS = {
     '--fps': 1, '--tolerance': 1, '--intrinsics': 4, '--max-pixels': 1, '--color-topic': 1,
-    '--depth-topic': 1,
+    '--depth-topic': 1, '--rectified': 1,
 }  # fmt: skip
 TRACK_OPTIONS = {'--init': 4, '--start': 1, '--end': 1, '--param': 1}
 

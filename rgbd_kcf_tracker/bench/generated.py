@@ -17,6 +17,7 @@ import textwrap
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from rgbd_kcf_tracker.live.following import FollowParameters
 from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.live.settings import READ_ONLY, NodeParameters
 from rgbd_kcf_tracker.parameters import ParameterInfo, Scalar, describe
@@ -124,6 +125,12 @@ def parameters_markdown() -> str:
         'All are read when it starts; see [the page in the browser](view.md).',
         '',
         *_table('', describe(ViewerParameters)),
+        '',
+        '# Parameters of the follow node',
+        '',
+        'All are read when it starts; see [following a person](follow.md).',
+        '',
+        *_table('', describe(FollowParameters)),
     ]
     return '\n'.join(lines) + '\n'
 

@@ -62,6 +62,13 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
         help="camera in pixels, instead of the recording's own",
     )
     group.add_argument(
+        '--rectified',
+        choices=('auto', 'yes', 'no'),
+        default='auto',
+        help="whether a bag's colour images are rectified, so that P of CameraInfo is their camera "
+        '(default auto: by the name of their topic)',
+    )
+    group.add_argument(
         '--max-pixels',
         metavar='N',
         type=int,
@@ -135,6 +142,7 @@ def read_options(args: argparse.Namespace) -> ReadOptions:
         tolerance_s=args.tolerance,
         fps=args.fps,
         intrinsics=None if args.intrinsics is None else parse_intrinsics(args.intrinsics),
+        rectified=args.rectified,
         max_pixels=args.max_pixels,
     )
 

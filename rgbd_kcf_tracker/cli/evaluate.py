@@ -175,6 +175,7 @@ def _merge(args: argparse.Namespace) -> int:
 def _report(folder: Path, whole: Whole) -> int:
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.perframe import collect
+    from rgbd_kcf_tracker.evaluation.place_tables import places_table
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.score_tables import overview
 
@@ -188,6 +189,9 @@ def _report(folder: Path, whole: Whole) -> int:
     elif collected.results or not interrupts.asked:
         measured = write_report(folder, collected, whole.contenders, whole.failures, whole.heading)
         print(overview(measured).text())
+        places = places_table(collected.places)
+        if places is not None:
+            print(f'\n{places.text()}')
         times = _write_times(folder, [(r.tracker, r.sequence) for r in collected.results])
         print(f'\n{times}\n\nreport: {folder / PAGE}')
     return end(whole.failures)

@@ -82,6 +82,12 @@ def _as_text(info: RecordingInfo) -> str:
     else:
         c = info.intrinsics
         lines.append(f'intrinsics    fx {c.fx:.2f}  fy {c.fy:.2f}  cx {c.cx:.2f}  cy {c.cy:.2f}')
+        if c.lens is not None:
+            from rgbd_kcf_tracker.recordings.camera_info import model_of
+
+            model, coefficients = model_of(c.lens)
+            numbers = ' '.join(f'{value:.4g}' for value in coefficients)
+            lines.append(f'distortion    {model} {numbers}')
     if info.truth_frames is None:
         lines.append('ground truth  none')
     else:
@@ -115,6 +121,8 @@ def _table(rows: list[tuple[str, ...]]) -> list[str]:
 
 
 def _as_dict(info: RecordingInfo) -> dict[str, Any]:
+    from rgbd_kcf_tracker.recordings.camera_info import model_of
+
     camera = info.intrinsics
     return {
         'path': str(info.path),
@@ -125,7 +133,14 @@ def _as_dict(info: RecordingInfo) -> dict[str, Any]:
         'rate_hz': info.rate_hz,
         'intrinsics': None
         if camera is None
-        else {'fx': camera.fx, 'fy': camera.fy, 'cx': camera.cx, 'cy': camera.cy},
+        else {
+            'fx': camera.fx,
+            'fy': camera.fy,
+            'cx': camera.cx,
+            'cy': camera.cy,
+            'distortion_model': model_of(camera.lens)[0],
+            'd': model_of(camera.lens)[1],
+        },
         'truth_frames': info.truth_frames,
         'problem': info.problem,
         'warnings': list(info.warnings),

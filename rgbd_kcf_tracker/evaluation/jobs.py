@@ -9,7 +9,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     with_intrinsics,
     without_depth,
 )
+from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import place_of
+from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, Truth, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
@@ -40,6 +42,7 @@ from rgbd_kcf_tracker.evaluation.store import (
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
+from rgbd_kcf_tracker.track import Track
 
 
 def _environment_digest() -> str:
@@ -209,7 +212,8 @@ def _run_sequence(job: Job) -> list[Failure]:
         write_json(
             meta_path(target),
             _meta(job, contender, one, restart, opened)
-            | {'image_size': truth.size, 'thumbnail_scale': thumbnails.scale},
+            | {'image_size': truth.size, 'thumbnail_scale': thumbnails.scale}
+            | {'places': _places(one.tracks, truth)},
         )
         write_times(job.folder, contender.name, sequence.name, one.milliseconds)
     return failures
@@ -260,6 +264,20 @@ def _meta(
             'run_overlaps': counted.overlaps.tolist(),
         }
     return meta
+
+
+def _places(tracks: list[Track], truth: Truth) -> list[tuple[float, ...]]:
+    """Places against the truth, from the second frame on."""
+    found, astray = [], False
+    for index in range(1, len(tracks)):
+        box = tracks[index].box
+        if box is not None:
+            true = (truth.visible[index], truth.bodies[index])
+            astray = max((box.iou(b) for b in true if b is not None), default=0.0) < STRANGER_IOU
+        place = place_of(tracks[index], truth.positions[index], truth.velocities[index], astray)
+        if place is not None:
+            found.append(astuple(place))
+    return found
 
 
 def as_asked(

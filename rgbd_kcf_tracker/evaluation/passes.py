@@ -28,6 +28,7 @@ import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.evaluation.metrics import vot
+from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Triple
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.track import Track, Tracker, TrackState
 
@@ -171,7 +172,7 @@ class Truth:
     Attributes:
         size: width and height of the last image.
         stamps_ns: of the frames.
-        visible, bodies, fractions, judged: see :class:`Sample`.
+        visible, bodies, fractions, judged, positions, velocities: see :class:`Sample`.
     """
 
     size: tuple[int, int] = (0, 0)
@@ -180,6 +181,8 @@ class Truth:
     bodies: list[Box | None] = field(default_factory=list)
     fractions: list[float | None] = field(default_factory=list)
     judged: list[bool] = field(default_factory=list)
+    positions: list[Triple | None] = field(default_factory=list)
+    velocities: list[Triple | None] = field(default_factory=list)
 
     def feed(self, sample: Sample) -> None:
         """Note one more."""
@@ -189,6 +192,8 @@ class Truth:
         self.bodies.append(sample.body)
         self.fractions.append(sample.fraction)
         self.judged.append(sample.judged)
+        self.positions.append(sample.position)
+        self.velocities.append(sample.velocity)
 
 
 class Thumbnails:

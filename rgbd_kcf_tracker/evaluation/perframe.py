@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path, truth_path
 from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, measure
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place
 from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
 from rgbd_kcf_tracker.evaluation.store import (
     read_json,
@@ -105,12 +106,14 @@ class Collected:
         infos: per sequence.
         short_term: runs with re-initialisation, per tracker and sequence.
         unmeasured: sequences that were run but have no ground truth.
+        places: in metres against the truth, per tracker and sequence, where both are known.
     """
 
     results: list[Result]
     infos: dict[str, Info]
     short_term: dict[tuple[str, str], ShortTermRun]
     unmeasured: list[str]
+    places: dict[tuple[str, str], list[Place]] = field(default_factory=dict)
 
 
 def collect(
@@ -151,6 +154,11 @@ def _collect_one(
     collected.results.append(
         Result(contender.name, sequence.name, truth.stamps_ns, frames, truth.fraction, truth.judged)
     )
+    if meta.get('places'):
+        collected.places[contender.name, sequence.name] = [
+            Place(bool(hidden), bool(astray), *(math.nan if v is None else v for v in numbers))
+            for hidden, astray, *numbers in meta['places']
+        ]
     if 'short_term' in meta:
         run = meta['short_term']
         overlaps = np.array(run['run_overlaps'], np.float64)

@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.evaluation.identity import Pairs
 from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
+from rgbd_kcf_tracker.evaluation.place_tables import places_table
 from rgbd_kcf_tracker.evaluation.store import slug, write_json
 from rgbd_kcf_tracker.evaluation.table import Table
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
@@ -96,6 +97,7 @@ def write_report(
         'sequence_table': score_tables.by_sequence(measured),
         'long_term': long_term,
         'reliability': reliability,
+        'places': places_table(collected.places),
     }
     every = _all_tables(content)
     _write_tables(folder, every)
@@ -278,7 +280,8 @@ def _short(datasets: Sequence[str]) -> str:
 def _all_tables(content: Mapping[str, Any]) -> list[Table]:
     found: list[Table] = []
     for value in content.values():
-        found += value if isinstance(value, list) else [value]
+        if value is not None:
+            found += value if isinstance(value, list) else [value]
     return found
 
 

@@ -14,9 +14,10 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from rgbd_kcf_tracker.live.processor import Camera, Capture
+from rgbd_kcf_tracker.live.processor import Capture
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.timeline import StampRepair
+from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer, patient_pairer
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Moment, Timeline
+from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
@@ -35,14 +36,6 @@ from rgbd_kcf_tracker.recordings.images import (
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
-
-
-class Camera(NamedTuple):
-    """What camera_info says: intrinsics, and the image size they are for (zeros: any)."""
-
-    intrinsics: Intrinsics
-    width: int
-    height: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,12 +230,9 @@ class Processor:
         if camera is None:
             return None
         height, width = color.shape[:2]
-        if camera.width and camera.height and (camera.width, camera.height) != (width, height):
-            self._fault(
-                'bad_camera_info',
-                f'camera_info is for {camera.width}x{camera.height} images but these are '
-                f'{width}x{height}: it is left out',
-            )
+        misfit = camera.misfit(width, height)
+        if misfit:
+            self._fault('bad_camera_info', f'camera_info {misfit}: it is left out')
             return None
         return camera.intrinsics
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
+from rgbd_kcf_tracker.recordings import camera_info
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE
 from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
@@ -147,6 +148,13 @@ class NodeParameters(Parameters):
         'How depth images arrive; compressed is the bare PNG or TIFF of kinect2_bridge.',
         choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
         source='image_transport',
+    )
+    color_rectified: str = parameter(
+        camera_info.AUTO,
+        'Whether the colour images are rectified, so that P of camera_info is their camera and not '
+        'K with the lens: auto goes by the name of the topic, which has the word rect in it then.',
+        choices=camera_info.RECTIFIED,
+        source='sensor_msgs/CameraInfo',
     )
     reliability: str = parameter(
         AUTO,

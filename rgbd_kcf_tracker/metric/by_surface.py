@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, ga
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.metric.identity.middle import Belief, MiddleFilter
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
@@ -61,23 +62,6 @@ class Candidate:
     probability: float
 
 
-@dataclass(frozen=True, slots=True)
-class Belief:
-    """Where a target is believed to be, in the camera's optical frame.
-
-    Attributes:
-        position: metres, the middle of the body.
-        velocity: metres per second.
-        covariance: of the position, ``(3, 3)`` row by row in square metres.
-        velocity_covariance: likewise of the velocity.
-    """
-
-    position: tuple[float, float, float]
-    velocity: tuple[float, float, float]
-    covariance: tuple[float, ...]
-    velocity_covariance: tuple[float, ...]
-
-
 class BySurface:
     """Follows one target from scene to scene.
 
@@ -108,6 +92,8 @@ class BySurface:
             parameters.speed,
             np.full(3, parameters.acceleration),
         )
+        self._middle = MiddleFilter()
+        self._middle.seen(scene.view, first, placed, self.body)
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
@@ -178,6 +164,7 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(scene.motion)
         self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
+        self._middle.predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
         if following:
             self._cloud = None
         elif self._parameters.use_particles:
@@ -217,19 +204,22 @@ class BySurface:
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
 
-    def belief(self) -> Belief:
+    def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""
-        place, sigma = self.motion.position, self.motion.sigma
-        if self._cloud is not None:
-            place, sigma = self._cloud.mean, self._cloud.spread
-        middle = place + np.array([0.0, self.body.height / 2, 0.0])
-        x, y, z = (float(v) for v in middle)
-        u, v, w = (float(speed) for speed in self.motion.velocity)
-        covariance, of_velocity = (
-            tuple(float(c) for c in np.diag(np.square(s)).ravel())
-            for s in (sigma, self.motion.speed_sigma)
-        )
-        return Belief((x, y, z), (u, v, w), covariance, of_velocity)
+        if self._cloud is None or self.hidden_for == 0.0:
+            return self._middle.belief()
+        return self._middle.hidden(self._cloud)
+
+    def glimpse(self, scene: Scene, found: Candidate) -> Belief | None:
+        """Where a candidate is that may be the target, of which nothing else is known."""
+        middle = MiddleFilter()
+        middle.seen(scene.view, found.seen, found.placed, self.body)
+        return middle.belief()
+
+    def drift(self, dt: float) -> None:
+        """Go on by ``dt`` seconds without a picture of depth."""
+        self.motion.predict(dt)
+        self._middle.predict(dt)
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
@@ -239,6 +229,7 @@ class BySurface:
             self._parameters.speed,
             np.full(3, self._parameters.acceleration),
         )
+        self._middle.forget()
 
     def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
@@ -250,6 +241,7 @@ class BySurface:
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
+        self._middle.seen(scene.view, seen, placed, self.body)
         if not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
             self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
@@ -269,7 +261,9 @@ class BySurface:
         k, z = view.intrinsics, float(self.motion.position[2])
         x = (box.cx / view.step - k.cx) * z / k.fx
         y = (box.y / view.step - k.cy) * z / k.fy
-        self.motion.correct(np.array([x, y, z]), np.array([0.1, 0.1, 10.0]))
+        place, sigma = np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
+        self.motion.correct(place, sigma)
+        self._middle.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
 
     @staticmethod

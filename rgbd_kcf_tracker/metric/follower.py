@@ -11,6 +11,12 @@ from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.identity.middle import (
+    Belief,
+    in_metres,
+    row_by_row,
+    triple,
+)
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -86,7 +92,8 @@ class Follower:
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
-        self.track = self._tracked(frame, box, 1.0, self._depth_of_surface())
+        belief = None if self._surface is None else self._surface.belief()
+        self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
         """What was weighed in the last frame, best first, and the box each would have given.
@@ -145,7 +152,7 @@ class Follower:
         surface: BySurface,
     ) -> Track:
         if account is None:
-            surface.motion.predict(dt)
+            surface.drift(dt)
             return self._glance(frame, None, view, dt, surface)
         found = surface.step(account, dt)
         if found is None:
@@ -156,14 +163,15 @@ class Follower:
             new = index >= 0 and account.owner[index] < 0
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
+                belief = surface.glimpse(account.scene, found)
                 surface.miss(account.scene, dt)
-                return self._tracked(frame, box, found.probability, found.seen.depth)
+                return self._tracked(frame, box, found.probability, found.seen.depth, belief)
             surface.resume(found)
         box = surface.take(account.scene, found, dt)
         self.seen = found.seen
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
-        return self._tracked(frame, box, found.probability, found.seen.depth)
+        return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
 
     def _recognised(self, stranger: Person, time: float) -> bool:
         """Whether enough was seen of somebody to say for good that he is the target."""
@@ -189,9 +197,11 @@ class Follower:
                 look = self._look.glance(frame, box, dt)
                 if look is not None:
                     surface.seen_elsewhere(view, look.box)
-                    return self._tracked(frame, look.box, _score(look), look.depth)
+                    return self._tracked(
+                        frame, look.box, _score(look), look.depth, surface.belief()
+                    )
         surface.miss(scene, dt)
-        return self._hidden(dt)
+        return self._hidden(frame, dt)
 
     # -- by look ----------------------------------------------------------------------------------
 
@@ -213,9 +223,9 @@ class Follower:
             assert self._surface is not None
             assert self.seen is not None
             box = outline_box(account.scene, self.seen)
-            return self._tracked(frame, box, NEW_SCORE, self.seen.depth)
+            return self._tracked(frame, box, NEW_SCORE, self.seen.depth, self._surface.belief())
         if look is None:
-            return self._hidden(dt)
+            return self._hidden(frame, dt)
         return self._tracked(frame, look.box, _score(look), look.depth)
 
     def _follow_size(self, frame: Frame) -> None:
@@ -256,38 +266,43 @@ class Follower:
 
     # -- answers ----------------------------------------------------------------------------------
 
-    def _hidden(self, dt: float) -> Track:
-        lost = self._hidden_for + dt > self._parameters.lost_after
-        state = TrackState.LOST if lost else TrackState.OCCLUDED
-        if self._surface is None:
+    def _hidden(self, frame: Frame, dt: float) -> Track:
+        hidden = self._hidden_for + dt
+        state = TrackState.LOST if hidden > self._parameters.lost_after else TrackState.OCCLUDED
+        belief = None
+        if self._surface is not None and hidden <= self._parameters.predict_for:
+            belief = in_metres(self._surface.belief(), frame)
+        if belief is None:
             return Track(None, state)
-        belief = self._surface.belief()
         return Track(
             None,
             state,
-            velocity=belief.velocity,
-            covariance=belief.covariance,
-            predicted=belief.position,
-            velocity_covariance=belief.velocity_covariance,
+            velocity=triple(belief.velocity),
+            covariance=row_by_row(belief.covariance),
+            predicted=triple(belief.position),
+            velocity_covariance=row_by_row(belief.velocity_covariance),
         )
 
-    def _tracked(self, frame: Frame, box: Box, score: float, depth: float | None) -> Track:
-        position = velocity = covariance = velocity_covariance = None
-        if depth is not None and frame.intrinsics is not None:
-            position = frame.intrinsics.deproject(box.cx, box.cy, depth)
-            if self._surface is not None:
-                belief = self._surface.belief()
-                velocity, covariance = belief.velocity, belief.covariance
-                velocity_covariance = belief.velocity_covariance
+    def _tracked(
+        self,
+        frame: Frame,
+        box: Box,
+        score: float,
+        depth: float | None,
+        belief: Belief | None = None,
+    ) -> Track:
+        belief = None if depth is None else in_metres(belief, frame)
+        if belief is None:
+            return Track(box, TrackState.TRACKING, score, depth, frame.position(box, depth))
         return Track(
             box,
             TrackState.TRACKING,
             score,
             depth,
-            position,
-            velocity=velocity,
-            covariance=covariance,
-            velocity_covariance=velocity_covariance,
+            triple(belief.position),
+            velocity=triple(belief.velocity),
+            covariance=row_by_row(belief.covariance),
+            velocity_covariance=row_by_row(belief.velocity_covariance),
         )
 
 

@@ -74,6 +74,13 @@ class MetricParameters(Parameters):
         minimum=0.0,
         maximum=3600.0,
     )
+    predict_for: float = parameter(
+        2.0,
+        'Time for which it is said where a hidden target is believed to be.',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
+    )
     most_candidates: int = parameter(
         10, 'Largest number of surfaces examined in a frame.', minimum=1, maximum=100
     )

@@ -19,6 +19,12 @@ from rgbd_kcf_tracker.metric.by_surface import Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import Follower
+from rgbd_kcf_tracker.metric.identity.middle import (
+    in_metres,
+    row_by_row,
+    sighted,
+    triple,
+)
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -172,16 +178,15 @@ class MetricTargets:
                 continue
             seen = account.sights[column].figure.seen
             box = outline_box(account.scene, seen)
-            position = None
-            if frame.intrinsics is not None:
-                position = frame.intrinsics.deproject(box.cx, box.cy, seen.depth)
+            belief = in_metres(sighted(account.scene.view, seen), frame)
             tracks[self._name(person)] = Track(
                 box,
                 TrackState.TRACKING,
                 account.probability(row, column),
                 seen.depth,
-                position,
+                None if belief is None else triple(belief.position),
                 id=self._name(person),
+                covariance=None if belief is None else row_by_row(belief.covariance),
             )
         for person in account.people:
             gone = account.time - person.seen_at

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.recordings.bag_topics import (
     look_at_images,
     rate_of,
 )
+from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
@@ -30,15 +31,12 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_compressed_depth,
     decode_depth,
 )
-from rgbd_kcf_tracker.recordings.messages import (
-    box_from_polygon,
-    intrinsics_from_info,
-)
+from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.recordings.recording import Closing, ReadOptions, RecordingInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
-from rgbd_kcf_tracker.recordings.topics import ChosenTopics, choose_topics
+from rgbd_kcf_tracker.recordings.topics import ChosenTopics, base_name, choose_topics
 
 
 class BagRecording(Closing):
@@ -61,7 +59,7 @@ class BagRecording(Closing):
             self._depth = None if self.topics.depth is None else self.bag.topics[self.topics.depth]
             self._pairs, told = pair_topics(self._color, self._depth, options.tolerance_s)
             self.warnings += told
-            self.intrinsics = options.intrinsics or self._read_intrinsics()
+            self.intrinsics = options.intrinsics or self._read_intrinsics(options.rectified)
             self.groundtruth = self._read_truth(TRUTH_TOPICS[0])
             self.groundtruth_body = known(self._read_truth(TRUTH_TOPICS[1]))
         except BaseException:
@@ -165,27 +163,25 @@ class BagRecording(Closing):
             self._warned.add(text)
             self.warnings.append(text)
 
-    def _read_intrinsics(self) -> Intrinsics | None:
+    def _read_intrinsics(self, rectified: str) -> Intrinsics | None:
         if self.topics.info is None:
             return None
         topic = self.bag.topics[self.topics.info]
         size = next(i.size for i in self._images if i.name == self.topics.color)
         try:
             msg = self.bag.message(topic, 0)
-            found = intrinsics_from_info(msg)
+            found = camera_from_info(msg, base_name(self.topics.color), rectified)
         except RgbdKcfError as error:
             self.warnings.append(f'{topic.name}: {error}')
             return None
-        told = int(msg.width), int(msg.height)
         if found is None:
             self.warnings.append(f'{topic.name} holds zeros: the camera is not calibrated')
-        elif size is not None and all(told) and told != size:
-            self.warnings.append(
-                f'{topic.name} is for {told[0]}x{told[1]} images but these are '
-                f'{size[0]}x{size[1]}: left out'
-            )
             return None
-        return found
+        misfit = '' if size is None else found.misfit(*size)
+        if misfit:
+            self.warnings.append(f'{topic.name} {misfit}: left out')
+            return None
+        return found.intrinsics
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         topic = self.bag.topics.get(name)

@@ -1,44 +1,15 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What other messages than images mean: cameras, boxes, stamps; from rclpy or from rosbags."""
+"""What other messages than images and cameras mean: boxes, stamps; from rclpy or from rosbags."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.track import Track, TrackState
-
-
-def intrinsics_from_info(msg: Any) -> Intrinsics | None:
-    """The pinhole camera of a ``sensor_msgs/CameraInfo``.
-
-    Args:
-        msg: with ``k`` and ``p`` (ROS 2) or ``K`` and ``P`` (ROS 1).
-
-    Returns:
-        The intrinsics in ``K``, or in ``P`` where that is zero; None for an uncalibrated camera,
-        where both are.
-
-    Raises:
-        ImageError: where the numbers are no camera (negative, infinite, too few).
-    """
-    k: Any = msg.k if hasattr(msg, 'k') else getattr(msg, 'K', ())
-    p: Any = msg.p if hasattr(msg, 'p') else getattr(msg, 'P', ())
-    try:
-        from_k = tuple(float(k[i]) for i in (0, 4, 2, 5))
-        from_p = tuple(float(p[i]) for i in (0, 5, 2, 6))
-    except (IndexError, TypeError, ValueError):
-        raise ImageError('camera_info has no 3x3 K and 3x4 P: leave it out or calibrate') from None
-    values = from_k if from_k[0] or from_k[1] else from_p
-    if not values[0] and not values[1]:
-        return None
-    try:
-        return Intrinsics(*values)
-    except RgbdKcfError as error:
-        raise ImageError(f'camera_info is no camera: {error}') from None
 
 
 def box_from_polygon(points: Any) -> Box | None:

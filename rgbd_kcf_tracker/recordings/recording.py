@@ -14,6 +14,7 @@ from typing import Protocol, TypeVar
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.camera_info import AUTO, RECTIFIED
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
 
 C = TypeVar('C', bound='Closing')
@@ -37,11 +38,13 @@ class ReadOptions:
             pair is as near as that (single shots, slow cameras).
         fps: frames per second of a sequence folder without ``timestamps.txt``.
         intrinsics: used instead of the recording's own.
+        rectified: whether the colour images of a bag are rectified, so that ``P`` of CameraInfo is
+            their camera: ``yes``, ``no``, or ``auto`` to go by the topic's name.
         max_pixels: of the largest image that is read.
 
     Raises:
         ParameterError: for a negative tolerance, a rate out of its range, or a limit that is not
-            above 0.
+            above 0, or another word for ``rectified``.
     """
 
     color_topic: str | None = None
@@ -50,6 +53,7 @@ class ReadOptions:
     tolerance_s: float | None = None
     fps: float = 30.0
     intrinsics: Intrinsics | None = None
+    rectified: str = AUTO
     max_pixels: int = MAX_PIXELS
 
     def __post_init__(self) -> None:
@@ -59,6 +63,10 @@ class ReadOptions:
             )
         if self.tolerance_s is not None and not 0 <= self.tolerance_s <= 3600:
             raise ParameterError(f'tolerance is {self.tolerance_s:g} s: it must be 0 or more')
+        if self.rectified not in RECTIFIED:
+            raise ParameterError(
+                f'rectified is {self.rectified!r}: choose one of {", ".join(RECTIFIED)}'
+            )
         if self.max_pixels < 1:
             raise ParameterError(f'max_pixels is {self.max_pixels}: it must be above 0')
 

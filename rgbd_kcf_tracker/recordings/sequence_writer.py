@@ -17,18 +17,20 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write
-from rgbd_kcf_tracker.recordings.textfiles import format_box
+from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, format_box
 
 # At the end of the name of an image that is being written.
 _PART = '.part'
 _FILES = (
     'rgb',
     'depth',
-    'intrinsics.json',
+    INTRINSICS,
+    CAMERA_INFO,
     'timestamps.txt',
     'groundtruth.txt',
     'groundtruth_body.txt',
@@ -132,9 +134,7 @@ class SequenceWriter(FrameWriter):
                 images.append(f'depth/{name}.png')
                 self._write_image(images[1], millimetres(frame.depth))
             if self._count == 0 and frame.intrinsics is not None:
-                camera = frame.intrinsics
-                values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
-                self._write_line('intrinsics.json', json.dumps(values, indent=2))
+                self._write_camera(frame, frame.intrinsics)
             self._write_line('groundtruth.txt', format_box(visible))
             self._write_line('groundtruth_body.txt', format_box(body))
             if visible_fraction is not None:
@@ -164,6 +164,22 @@ class SequenceWriter(FrameWriter):
             with contextlib.suppress(OSError):  # a full disk was told when it was written
                 file.close()
         self.output.end(whole=whole, anything=self._count > 0)
+
+    def _write_camera(self, frame: Frame, camera: Intrinsics) -> None:
+        """``intrinsics.json``, or ``camera_info.json`` where it has a lens."""
+        if camera.lens is None:
+            values = {k: getattr(camera, k) for k in ('fx', 'fy', 'cx', 'cy')}
+            self._write_line(INTRINSICS, json.dumps(values, indent=2))
+            return
+        model, coefficients = model_of(camera.lens)
+        fields = {
+            'width': frame.width,
+            'height': frame.height,
+            'distortion_model': model,
+            'D': coefficients,
+            'K': [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0],
+        }
+        self._write_line(CAMERA_INFO, json.dumps(fields, indent=2))
 
     def _write_people(self, people: Mapping[int, PersonTruth]) -> None:
         shown = {who: truth for who, truth in people.items() if truth.shown is not None}

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.camera_info import NO, YES, camera_from_info
 from rgbd_kcf_tracker.recordings.files import read_text
-from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
 
 INTRINSICS, CAMERA_INFO = 'intrinsics.json', 'camera_info.json'
 
@@ -128,7 +128,8 @@ def folder_intrinsics(folder: Path) -> Intrinsics | None:
     """The camera of a sequence folder, None where it states none.
 
     It is in ``intrinsics.json``, or else in ``camera_info.json``: the fields of
-    ``sensor_msgs/CameraInfo``, ``K`` and ``P`` in small or capital letters.
+    ``sensor_msgs/CameraInfo``, ``D``, ``K`` and ``P`` in small or capital letters, and
+    ``rectified``, true where the images are.
 
     Raises:
         RecordingError: where a file holds no camera.
@@ -140,14 +141,17 @@ def folder_intrinsics(folder: Path) -> Intrinsics | None:
         return None
     try:
         fields = {str(name).lower(): value for name, value in json.loads(read_text(path)).items()}
-        found = intrinsics_from_info(SimpleNamespace(k=fields['k'], p=fields.get('p', [0.0] * 12)))
+        roi = SimpleNamespace(**(fields.pop('roi', None) or {}))
+        rectified = YES if fields.pop('rectified', False) else NO
+        told = SimpleNamespace(**({'p': [0.0] * 12} | fields | {'k': fields['k'], 'roi': roi}))
+        found = camera_from_info(told, rectified=rectified)
     except RecordingError:
         raise
     except (RecursionError, ValueError, TypeError, KeyError, AttributeError, RgbdKcfError) as error:
         raise RecordingError(
             f'{path} holds no camera ({error}): write the fields of CameraInfo, or {INTRINSICS}'
         ) from None
-    return found
+    return None if found is None else found.intrinsics
 
 
 def read_lines(path: Path) -> list[str]:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
+from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import PackedImage, RawImage
 from rgbd_kcf_tracker.recordings.message_types import MessageTypes
 from rgbd_kcf_tracker.recordings.messages import BOX_KEYS, POSITION_KEYS, PREDICTED_KEY
@@ -264,15 +265,16 @@ class TrackMessages:
     # -- the camera -------------------------------------------------------------------------------
 
     def camera_info(self, header: Any, width: int, height: int, intrinsics: Intrinsics) -> Any:
-        """``sensor_msgs/CameraInfo`` of a camera without distortion."""
+        """``sensor_msgs/CameraInfo`` of the camera of images as they are: not rectified."""
+        model, coefficients = model_of(intrinsics.lens)
         fx, fy, cx, cy = intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy
         return self._make(
             'sensor_msgs/msg/CameraInfo',
             header=header,
             height=height,
             width=width,
-            distortion_model='plumb_bob',
-            d=np.zeros(5),
+            distortion_model=model,
+            d=np.array(coefficients, np.float64),
             k=np.array([fx, 0, cx, 0, fy, cy, 0, 0, 1], np.float64),
             r=np.eye(3).reshape(-1),
             p=np.array([fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0], np.float64),

@@ -24,13 +24,13 @@ from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.live.intake import Intake
-from rgbd_kcf_tracker.live.processor import Camera, Capture, Processor
+from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session, warm_up
 from rgbd_kcf_tracker.live.settings import ALL, NodeParameters
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.story import Allowance
 from rgbd_kcf_tracker.live.worker import Worker
-from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info
+from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
@@ -279,15 +279,16 @@ class TrackerNode(LifecycleNode):
             self._hand_over(self._intake.depth(message, time.monotonic_ns()))
 
     def _on_camera_info(self, message: CameraInfo) -> None:
-        if self._intake is None:
+        if self._intake is None or self._inputs is None:
             return
         try:
-            intrinsics = intrinsics_from_info(message)
+            camera = camera_from_info(
+                message, self._inputs.topic(COLOR), self._settings.color_rectified
+            )
         except RgbdKcfError as error:
             self._fault('bad_camera_info', f'camera_info cannot be used: {error}')
             return
-        if intrinsics is not None:
-            camera = Camera(intrinsics, int(message.width), int(message.height))
+        if camera is not None:
             self._hand_over(self._intake.camera_info(camera, time.monotonic_ns()))
 
     def _poll(self) -> None:

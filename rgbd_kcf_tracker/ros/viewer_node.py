@@ -26,17 +26,18 @@ from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.parameters import ParameterInfo, describe
+from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.images import (
     decode_color,
     decode_compressed_color,
     decode_compressed_depth,
     decode_depth,
 )
-from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info, stamp_of, tracks_of_state
+from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
@@ -90,7 +91,7 @@ class ViewerNode(Node):
         self._images: list[Any] = []
         self._depths: dict[int, Any] = {}
         self._colors: dict[int, Any] = {}
-        self._camera: tuple[Intrinsics, int, int] | None = None
+        self._camera: Camera | None = None
         self._frame_id = ''
         self._unwatched = 0.0
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -127,11 +128,11 @@ class ViewerNode(Node):
 
     def _on_info(self, message: CameraInfo) -> None:
         try:
-            intrinsics = intrinsics_from_info(message)
+            camera = camera_from_info(message, self.resolve_topic_name(COLOR))
         except RgbdKcfError:
             return
-        if intrinsics is not None:
-            self._camera = (intrinsics, int(message.width), int(message.height))
+        if camera is not None:
+            self._camera = camera
 
     def _on_color(self, message: Any) -> None:
         if self.page.due():
@@ -216,8 +217,8 @@ class ViewerNode(Node):
     def _frame(self, color: Any, depth: Any, stamp: int) -> Frame:
         height, width = color.shape[:2]
         camera = None
-        if self._camera is not None and self._camera[1:] in ((width, height), (0, 0)):
-            camera = self._camera[0]
+        if self._camera is not None and not self._camera.misfit(width, height):
+            camera = self._camera.intrinsics
         if depth is not None:
             raw = self.settings.depth_transport == RAW
             try:

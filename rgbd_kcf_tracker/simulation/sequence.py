@@ -18,6 +18,8 @@ from rgbd_kcf_tracker.simulation.sensor import Sensor
 from rgbd_kcf_tracker.simulation.world import Vector, World
 
 EPOCH_NS = 1_700_000_000_000_000_000
+_MOMENT = 0.01
+"""Seconds to either side over which a velocity is taken: the step of the tabulated motions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,6 +138,15 @@ class SimulatedSequence:
         """
         rotation, place = self.scene.camera.at(self._offsets_ns[index] * 1e-9)
         return rotation.T, place
+
+    def velocity(self, index: int) -> tuple[float, float, float]:
+        """The target's over the ground at one frame, metres per second in the optical frame."""
+        t = self._offsets_ns[index] * 1e-9
+        target = self.scene.actors[self.scene.people[0]]
+        moved = (target.centre(t + _MOMENT) - target.centre(t - _MOMENT)) / (2 * _MOMENT)
+        rotation, _ = self.scene.camera.at(t)
+        x, y, z = (float(v) for v in rotation @ moved)
+        return x, y, z
 
     @property
     def people(self) -> tuple[int, ...]:

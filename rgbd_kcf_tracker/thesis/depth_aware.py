@@ -243,10 +243,7 @@ class DepthAwareTracker(ABC):
         box = Box.from_center(found.fine_cx, found.fine_cy, self._box.width, self._box.height)
         score = min(max(found.response, 0.0), 1.0)
         depth = self._depth_patch.depth if frame.depth is not None else None
-        position = None
-        if depth is not None and frame.intrinsics is not None:
-            position = frame.intrinsics.deproject(box.cx, box.cy, depth)
-        return Track(box, TrackState.TRACKING, score, depth, position)
+        return Track(box, TrackState.TRACKING, score, depth, frame.position(box, depth))
 
     def _rescale(self, frame: Frame, model: KcfModel) -> None:
         """Carry the target over to a stream whose image size has changed."""

@@ -64,6 +64,9 @@ class Sample:
         judged: False where the truth leaves open what is right: the frame does not count.
         people: everyone, of a sequence of kind :data:`EVERYONE`.
         number: of the frame in the recording, from 0; of a sequence of that kind.
+        position: of the middle of the target's body, ``(x, y, z)`` metres in the camera's optical
+            frame, None where unknown.
+        velocity: of the same over the ground, in metres per second along the same axes.
     """
 
     frame: Frame
@@ -73,6 +76,8 @@ class Sample:
     judged: bool = True
     people: tuple[Person, ...] = ()
     number: int = 0
+    position: tuple[float, float, float] | None = None
+    velocity: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

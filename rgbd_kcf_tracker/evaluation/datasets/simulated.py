@@ -97,8 +97,15 @@ def load(
     scene = simulate(scenario, seed=seed, rate_hz=rate_hz, duration_s=duration_s, size=size)
 
     def samples() -> Iterator[Sample]:
-        for moment in scene:
-            yield Sample(moment.frame, moment.visible, moment.body, moment.visible_fraction)
+        for number, moment in enumerate(scene):
+            yield Sample(
+                moment.frame,
+                moment.visible,
+                moment.body,
+                moment.visible_fraction,
+                position=moment.truth.position,
+                velocity=scene.velocity(number),
+            )
 
     return Opened(samples(), len(scene), has_body=True)
 

@@ -112,10 +112,20 @@ class HiddenCloud:
         return result
 
     @property
-    def spread(self) -> FloatArray:
-        """Standard deviation of the position, ``(3,)`` metres."""
-        result: FloatArray = np.sqrt(self._weights @ np.square(self._positions - self.mean))
-        return result
+    def believed(self) -> tuple[FloatArray, FloatArray]:
+        """Weighted mean position, ``(3,)`` metres, and its covariance, ``(3, 3)``."""
+        return self._moments(self._positions)
+
+    @property
+    def believed_velocity(self) -> tuple[FloatArray, FloatArray]:
+        """Weighted mean velocity, ``(3,)`` metres per second, and its covariance, ``(3, 3)``."""
+        return self._moments(self._velocities)
+
+    def _moments(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        mean: FloatArray = self._weights @ values
+        away = values - mean
+        covariance: FloatArray = (self._weights[:, None] * away).T @ away
+        return mean, covariance
 
     def distance(self, position: FloatArray, sigma: FloatArray) -> float:
         """How far a place is from where the target may be; 0 is amid all particles.

@@ -21,23 +21,23 @@ class MotionFilter:
 
     Args:
         position: ``(3,)`` metres.
-        position_sigma: metres.
-        speed_sigma: metres per second, of the unknown first velocity.
+        position_sigma: metres, one for all axes or ``(3,)``.
+        speed_sigma: metres per second, likewise, of the unknown first velocity.
         acceleration: metres per second squared, of the process noise.
     """
 
     def __init__(
         self,
         position: FloatArray,
-        position_sigma: float,
-        speed_sigma: float,
+        position_sigma: float | FloatArray,
+        speed_sigma: float | FloatArray,
         acceleration: FloatArray,
     ) -> None:
         self.position = np.array(position, dtype=np.float64)
         self.velocity = np.zeros(3)
-        self._p00 = np.full(3, position_sigma**2)
+        self._p00 = np.square(np.full(3, position_sigma, dtype=np.float64))
         self._p01 = np.zeros(3)
-        self._p11 = np.full(3, speed_sigma**2)
+        self._p11 = np.square(np.full(3, speed_sigma, dtype=np.float64))
         self._noise = np.array(acceleration, dtype=np.float64) ** 2
 
     @property
