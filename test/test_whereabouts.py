@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rgbd_kcf_tracker import Box, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.pose import Pose
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
+from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import UNKNOWN_HEADING, Walks
 
