@@ -197,3 +197,5 @@ class TrackPublishers:
         for made in self._all.values():
             self._node.destroy_lifecycle_publisher(made)
         self._all.clear()
+        if self._frames is not None:
+            self._frames.destroy()
