@@ -22,6 +22,7 @@ GOOD = Evidence(
     gone=0.1,
     missing=False,
     inland=0.0,
+    emerged=False,
     look=3.0,
     mine=5.0,
     rival=0.0,

@@ -22,6 +22,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rgbd_kcf_tracker import Frame
 from rgbd_kcf_tracker.errors import ImageError
 from rgbd_kcf_tracker.recordings import rvl
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, inspect
@@ -37,6 +38,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_compressed_color,
     decode_compressed_depth,
     decode_depth,
+    defer_depth,
     metres_from_float,
     metres_from_mm,
 )
@@ -496,3 +498,40 @@ def test_coverage_guided_fuzzing(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr[-3000:]
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize('encoding', ['16UC1', '32FC1'])
+@pytest.mark.parametrize('big', [False, True])
+def test_deferred_depth_is_the_same_wherever_it_is_looked_at(encoding: str, big: bool) -> None:
+    rng = np.random.default_rng(3)
+    values = rng.integers(0, 4, (30, 44)) * rng.integers(0, 2000, (30, 44))
+    kind = ('>' if big else '<') + {'16UC1': 'u2', '32FC1': 'f4'}[encoding]
+    padded = np.zeros((30, 50), kind)
+    padded[:, :44] = values if encoding == '16UC1' else values / 1000
+    msg = message(
+        height=30, width=44, encoding=encoding, step=padded.strides[0], is_bigendian=big,
+        data=padded.tobytes(),
+    )  # fmt: skip
+    whole = decode_depth(msg)
+    assert type(whole) is np.ndarray
+    assert whole.dtype == np.float32
+    deferred = defer_depth(msg)
+    assert not isinstance(deferred, np.ndarray)
+    assert (deferred.shape, deferred.ndim, deferred.dtype, len(deferred)) == (
+        (30, 44), 2, np.float32, 30
+    )  # fmt: skip
+    rows, cols = rng.integers(0, 30, (5, 1)), rng.integers(0, 44, 6)
+    keys = (slice(4, None, 8), slice(4, None, 8)), (rows, cols), (slice(3, 9), slice(None)), (7, 8)
+    for key in keys:
+        np.testing.assert_array_equal(deferred[key], whole[key])
+    part = deferred[2:4, 2:4]
+    part[:] = 9  # memory of its own
+    np.testing.assert_array_equal(np.asarray(deferred), whole)
+    np.testing.assert_array_equal(np.asarray(deferred, np.float64), whole.astype(np.float64))
+    np.testing.assert_array_equal(deferred > 1, whole > 1)
+    np.testing.assert_array_equal(2 * deferred, 2 * whole)
+    np.testing.assert_array_equal(np.isfinite(deferred), np.isfinite(whole))
+    assert np.nanmean(deferred) == np.nanmean(whole)
+    Frame(np.zeros((30, 44, 3), np.uint8), deferred)
+    with pytest.raises(ImageError, match='register'):
+        Frame(np.zeros((30, 45, 3), np.uint8), deferred)

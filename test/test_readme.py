@@ -21,7 +21,16 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r'\]\(([^)\s]+)\)', page.read_text(encoding='utf-8')):
         if re.match(r'[a-z]+:', target) or target.startswith('#'):
             continue
-        assert (page.parent / target.partition('#')[0]).exists(), f'{page.name}: {target}'
+        name, _, anchor = target.partition('#')
+        assert (page.parent / name).exists(), f'{page.name}: {target}'
+        if anchor:
+            headings = re.findall(r'^#+ (.*)$', (page.parent / name).read_text('utf-8'), re.M)
+            assert anchor in map(slug, headings), f'{page.name}: {target}'
+
+
+def slug(heading: str) -> str:
+    """A heading as links name it."""
+    return re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
 
 
 def test_make_has_the_targets_that_the_readme_names() -> None:

@@ -317,6 +317,37 @@ def test_worker_takes_all_in_order_and_outlives_errors() -> None:
     assert worker.submit(1) == 0
 
 
+@pytest.mark.parametrize(('work_s', 'kept'), [(0.0, 4), (0.03, 1)], ids=['fast', 'slow'])
+def test_a_fast_worker_that_was_held_up_catches_up(work_s: float, kept: int) -> None:
+    """And a slow one takes the newest: it never would."""
+    begun, done, gate = [], [], threading.Event()
+
+    def work(item: int) -> None:
+        begun.append(item)
+        time.sleep(work_s)
+        if item == 100:
+            gate.wait(5)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail, catch_up=3)
+    for item in range(20):
+        worker.submit(item)
+        time.sleep(0.02)
+    time.sleep(0.1)  # nothing waits
+    worker.submit(100)
+    time.sleep(0.1)  # it is in work
+    assert begun[-1] == 100
+    dropped = 0
+    for item in range(101, 107):
+        dropped += worker.submit(item)
+        time.sleep(0.02)
+    assert dropped == 6 - kept
+    gate.set()
+    time.sleep(0.3)
+    assert worker.stop()
+    assert done[-kept - 1 :] == [100, *range(107 - kept, 107)]
+
+
 def test_worker_ends_while_at_work() -> None:
     worker = Worker(lambda _: time.sleep(0.05), pytest.fail, keep=100)
     for item in range(100):

@@ -27,13 +27,14 @@ from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.export import export
-from rgbd_kcf_tracker.view.insight import Insight
+from rgbd_kcf_tracker.view.insight import Insight, insight_of
 from rgbd_kcf_tracker.view.player import Player
 from rgbd_kcf_tracker.view.showing import (
     Detail,
     Seen,
     depth_picture,
     ellipse,
+    ellipse_of,
     rival,
     room_points,
     show,
@@ -59,9 +60,18 @@ def tracked(variant: str = 'metric', frames: int | None = None) -> list[Track]:
 class Rig:
     """A player whose thread is this one."""
 
-    def __init__(self, box: bool = True, variant: str = 'metric') -> None:
-        start, first = first_box(recording(), None)
-        self.player = Player(recording(), variant, start=start, box=first if box else None)
+    def __init__(
+        self,
+        box: bool = True,
+        variant: str = 'metric',
+        scene: SimulatedRecording | None = None,
+        everyone: bool = False,
+    ) -> None:
+        scene = recording() if scene is None else scene
+        start, first = first_box(scene, None)
+        self.player = Player(
+            scene, variant, start=start, box=first if box else None, everyone=everyone
+        )
         self.player.board.watch(lambda: None)
         self.player._guarded(self.player._open)
 
@@ -79,6 +89,12 @@ def assert_same(target: dict[str, Any], track: Track) -> None:
     assert (target['box'] is None) == (track.box is None)
     if track.box is not None:
         assert target['box'] == [round(v, 2) for v in track.box.as_tuple()]
+    assert target['score'] == pytest.approx(track.score, abs=1e-4)
+    assert target['depth'] == (
+        None if track.depth is None else pytest.approx(track.depth, abs=1e-3)
+    )
+    for shown, known in (('position', track.position), ('predicted', track.predicted)):
+        assert target.get(shown) == (None if known is None else pytest.approx(known, abs=1e-3))
 
 
 def test_seeking_shows_what_the_tracker_says_of_that_frame() -> None:
@@ -89,6 +105,43 @@ def test_seeking_shows_what_the_tracker_says_of_that_frame() -> None:
         assert seen['frame'] == frame
         assert_same(seen['targets'][0], expected[frame])
     assert rig.ask('seek', frame=10_000)['frame'] == len(recording()) - 1
+
+
+def test_candidates_particles_and_ellipse_are_those_of_the_tracker() -> None:
+    scene = SimulatedRecording('occlusion', 3, 15.0, SIZE, 5.0)
+    start, box = first_box(scene, None)
+    tracker = create_tracker('metric')
+    frames = scene.frames(start)
+    track = tracker.start(next(frames), box)
+    seen, hidden = None, None
+    for number, frame in enumerate(frames, start=start + 1):
+        track = tracker.update(frame)
+        insight = insight_of(tracker)
+        if track.box is not None and insight.considered and seen is None:
+            seen = (number, insight)
+        if track.box is None and insight.particles is not None and track.covariance is not None:
+            hidden = (number, insight, track)
+            break
+    assert seen is not None
+    assert hidden is not None
+    rig = Rig(scene=scene)
+    (target,) = rig.ask('seek', frame=seen[0])['targets']
+    shown = [(c['box'], c['probability'], c['cues']) for c in target['considered']]
+    assert shown == [
+        (
+            [round(v, 2) for v in c.box.as_tuple()],
+            round(c.probability, 4),
+            {name: round(value, 2) for name, value in c.cues.items()},
+        )
+        for c in seen[1].considered[: len(shown)]
+    ]
+    (target,) = rig.ask('seek', frame=hidden[0])['targets']
+    assert_same(target, hidden[2])
+    places = [p[:3] for p in target['particles']]
+    np.testing.assert_allclose(places, hidden[1].particles, atol=0.006)
+    spread = np.reshape(hidden[2].covariance, (3, 3))[::2, ::2]
+    mean = np.array(hidden[2].predicted)[::2]
+    assert target['ellipse'][:5] == ellipse_of(mean, spread)
 
 
 def test_stepping_goes_both_ways() -> None:
@@ -129,11 +182,15 @@ def test_another_target_is_added_where_it_is_picked() -> None:
     assert seen['frame'] == 4
     assert [t['id'] for t in seen['targets']] == [1, 2]
     assert seen['targets'][1]['box'] == [20, 60, 30, 40]
-    # The first is where it was, and both go on.
-    assert_same(seen['targets'][0], tracked()[4])
+    # The first is started anew where it was, and both go on.
+    box = tracked()[4].box
+    assert box is not None
+    assert seen['targets'][0]['box'] == [round(v, 2) for v in box.as_tuple()]
     later = rig.ask('seek', frame=8)
     assert [t['id'] for t in later['targets']] == [1, 2]
     rig.ask('rename', id=2, name='chair')
+    rig.ask('rename', id=77, name='nobody')
+    assert set(rig.player._names) == {1, 2}
     assert rig.ask('remove', id=1)['targets'][0]['name'] == 'chair'
 
 
@@ -142,22 +199,12 @@ def crowd() -> SimulatedRecording:
     return SimulatedRecording('crowd', 3, 15.0, SIZE, 3.0)
 
 
-class Crowd(Rig):
-    """A player of a crowd, in which somebody is followed and everyone else may be."""
-
-    def __init__(self, everyone: bool) -> None:
-        start, first = first_box(crowd(), None)
-        self.player = Player(crowd(), 'metric', start=start, box=first, everyone=everyone)
-        self.player.board.watch(lambda: None)
-        self.player._guarded(self.player._open)
-
-
 def boxes_of(seen: dict[str, Any]) -> dict[int, Any]:
     return {t['id']: t['box'] for t in seen['targets']}
 
 
 def test_everyone_in_view_is_what_the_set_says_of_the_frame() -> None:
-    rig = Crowd(everyone=True)
+    rig = Rig(scene=crowd(), everyone=True)
     start, first = first_box(crowd(), None)
     targets = TargetSet('metric')
     targets.everyone = True
@@ -177,7 +224,7 @@ def test_everyone_in_view_is_what_the_set_says_of_the_frame() -> None:
 
 
 def test_one_of_everyone_is_followed_renamed_and_let_go() -> None:
-    rig = Crowd(everyone=True)
+    rig = Rig(scene=crowd(), everyone=True)
     seen = rig.ask('seek', frame=35)
     other = next(t for t in seen['targets'] if not t['chosen'] and t['box'])
     seen = rig.ask('follow', id=other['id'], frame=35)
@@ -194,7 +241,7 @@ def test_one_of_everyone_is_followed_renamed_and_let_go() -> None:
 
 
 def test_everyone_may_be_asked_for_later_and_keeps_the_ids_when_the_run_goes_on() -> None:
-    rig = Crowd(everyone=False)
+    rig = Rig(scene=crowd(), everyone=False)
     assert len(rig.ask('seek', frame=35)['targets']) == 1
     seen = rig.ask('everyone', value=True)
     assert seen['everyone']

@@ -50,7 +50,9 @@ def main(args: list[str] | None = None) -> int:
     from rclpy.executors import ExternalShutdownException
 
     rclpy.init()
-    camera = CameraNode(options.size, options.frames, options.compressed, options.wire)
+    camera = CameraNode(
+        options.size, options.frames, options.compressed, options.wire, answered=options.rate <= 0
+    )
     try:
         if not camera.await_listener(MATCH_TIMEOUT_S):
             return 1
@@ -70,7 +72,14 @@ def main(args: list[str] | None = None) -> int:
 class CameraNode:
     """Publishers of a colour, a depth and a camera_info topic, and what they send."""
 
-    def __init__(self, size: str, frames: int, compressed: bool, wire: bool = False) -> None:
+    def __init__(
+        self,
+        size: str,
+        frames: int,
+        compressed: bool,
+        wire: bool = False,
+        answered: bool = False,
+    ) -> None:
         from diagnostic_msgs.msg import DiagnosticArray
         from geometry_msgs.msg import PolygonStamped
         from rclpy.node import Node
@@ -91,9 +100,10 @@ class CameraNode:
         ]
         self._answers = self._stamp_ns = 0
         self._known = False
-        self.node.create_subscription(
-            PolygonStamped, 'tracker/box', self._answered, QoSProfile(depth=100)
-        )
+        if answered:  # else each answer would wake one more than the wire's
+            self.node.create_subscription(
+                PolygonStamped, 'tracker/box', self._answered, QoSProfile(depth=100)
+            )
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._heard, 10)
         messages = _messages(SIZES[size], frames)
         self._messages = [_packed(m) for m in messages] if compressed else list(messages)

@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_color,
     decode_compressed_color,
     decode_compressed_depth,
-    decode_depth,
+    defer_depth,
 )
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -139,7 +139,7 @@ class Processor:
             max_pixels=max_pixels,
         )
         self._decode_depth: Callable[[Any], DepthImage] = partial(
-            decode_depth if depth_transport == RAW else decode_compressed_depth,
+            defer_depth if depth_transport == RAW else decode_compressed_depth,
             max_pixels=max_pixels,
         )
 

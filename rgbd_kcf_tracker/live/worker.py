@@ -6,12 +6,37 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
 from typing import Generic, TypeVar
 
 T = TypeVar('T')
+
+
+FAST = 0.7
+"""Share of the time between two items that one may take where there is time to catch up."""
+REMEMBERED = 15
+"""Items of which the typical time is the median: half a second at 30 Hz."""
+
+
+class Typical:
+    """The median of the last values: one that was held up does not count."""
+
+    def __init__(self) -> None:
+        self._last: deque[float] = deque(maxlen=REMEMBERED)
+
+    def add(self, value: float) -> None:
+        """Take one more."""
+        self._last.append(value)
+
+    @property
+    def value(self) -> float | None:
+        """The median, None until there are enough."""
+        if len(self._last) < REMEMBERED:
+            return None
+        return sorted(self._last)[REMEMBERED // 2]
 
 
 class Worker(Generic[T]):
@@ -25,6 +50,8 @@ class Worker(Generic[T]):
         work: does one item. It must not raise; what it raises goes to ``failed``.
         failed: told of an exception of ``work`` or of a call, in the worker's thread.
         keep: items kept waiting at most; 1 is "the newest".
+        catch_up: as many more wait while items are worked off faster than they come, so that none
+            is lost where the work, or the whole process, was held up once.
         name: of the thread.
     """
 
@@ -34,11 +61,14 @@ class Worker(Generic[T]):
         failed: Callable[[Exception], None],
         *,
         keep: int = 1,
+        catch_up: int = 0,
         name: str = 'tracker',
     ) -> None:
         self._work = work
         self._failed = failed
-        self._keep = keep
+        self._keep, self._catch_up = keep, catch_up
+        self._work_s, self._period_s = Typical(), Typical()
+        self._came_s: float | None = None
         self._items: deque[T] = deque()
         self._calls: dict[str, Callable[[], None]] = {}
         self._condition = threading.Condition()
@@ -61,13 +91,23 @@ class Worker(Generic[T]):
         with self._condition:
             if self._stopping:
                 return 0
-            keep = max(self._keep - len(items), 0)
+            keep = max(self._most() - len(items), 0)
             while len(self._items) > keep:
                 self._items.popleft()
                 dropped += 1
             self._items.extend(items)
             self._condition.notify()
         return dropped
+
+    def _most(self) -> int:
+        now = time.monotonic()
+        if self._came_s is not None:
+            self._period_s.add(now - self._came_s)
+        self._came_s = now
+        work, period = self._work_s.value, self._period_s.value
+        if work is None or period is None or work > FAST * period:
+            return self._keep
+        return self._keep + self._catch_up
 
     def call(self, kind: str, function: Callable[[], None]) -> None:
         """Have a function called in the worker's thread, before the next item.
@@ -111,7 +151,10 @@ class Worker(Generic[T]):
                 if not self._items:
                     continue
                 item = self._items.popleft()
+            begun = time.monotonic()
             self._guarded(partial(self._work, item))
+            with self._condition:
+                self._work_s.add(time.monotonic() - begun)
             # Keep no reference while waiting: an image pair is 10 MB.
             del item
 

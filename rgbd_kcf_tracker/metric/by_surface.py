@@ -312,6 +312,7 @@ class BySurface:
         else:
             step = float((away / variance).sum())
         at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
+        came_in = self._came_in(account, seen)
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
@@ -321,7 +322,8 @@ class BySurface:
             ),
             gone=self.hidden_for + dt,
             missing=missing,
-            inland=0.0 if self._came_in(account, seen) else self._gone,
+            inland=0.0 if came_in else self._gone,
+            emerged=not came_in,
             look=claim.look if self._parameters.use_color else 0.0,
             mine=claim.mine if self._parameters.use_others else 0.0,
             rival=claim.rival if self._parameters.use_others else 0.0,

@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from typing import Any, cast
 
 import cv2
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from rgbd_kcf_tracker.errors import ImageError
 from rgbd_kcf_tracker.recordings import rvl
@@ -66,6 +68,39 @@ class EncodingError(ImageError):
     """An image is sound but of a kind that is not read: the whole stream will be."""
 
 
+class DeferredDepth(NDArrayOperatorsMixin):
+    """A depth image in the camera's units that is made metres where it is looked at.
+
+    A tracker looks at every eighth pixel of two million. Parts are arrays of their own; whatever
+    wants the whole, be it an operator or a function of NumPy's, gets that.
+
+    Args:
+        values: ``(H, W)`` as they came; not copied.
+        convert: makes float32 metres of an array of them.
+    """
+
+    def __init__(
+        self, values: npt.NDArray[Any], convert: Callable[[npt.NDArray[Any]], DepthImage]
+    ) -> None:
+        self._values, self._convert = values, convert
+        self.shape, self.ndim = values.shape, values.ndim
+        self.dtype = np.dtype(np.float32)
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, key: Any) -> DepthImage:
+        return self._convert(np.asarray(self._values[key]))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        # There is no whole that could be given without a copy, and `copy` came with NumPy 2.
+        return self[:].astype(dtype or np.float32, copy=False)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        whole = (np.asarray(i) if isinstance(i, DeferredDepth) else i for i in inputs)
+        return getattr(ufunc, method)(*whole, **options)
+
+
 def decode_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
     """The picture of a ``sensor_msgs/Image``.
 
@@ -107,13 +142,23 @@ def decode_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
     Raises:
         ImageError: for an unknown encoding or sizes that do not fit the data.
     """
+    return np.asarray(defer_depth(msg, max_pixels))
+
+
+def defer_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
+    """The same, made metres where it is looked at: see :class:`DeferredDepth`.
+
+    Raises:
+        ImageError: as :func:`decode_depth`.
+    """
     encoding = str(msg.encoding)
     if encoding not in _DEPTH_ENCODINGS:
         raise EncodingError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
     kind = _DEPTH_ENCODINGS[encoding]
     rows = np.ascontiguousarray(_rows(msg, int(kind[1]), max_pixels))
     values = rows.view(('>' if msg.is_bigendian else '<') + kind)
-    return metres_from_mm(values) if kind == 'u2' else metres_from_float(values)
+    made = DeferredDepth(values, metres_from_mm if kind == 'u2' else metres_from_float)
+    return cast(DepthImage, made)
 
 
 def decode_compressed_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:

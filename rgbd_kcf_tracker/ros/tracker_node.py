@@ -46,6 +46,8 @@ DIAGNOSTICS_PERIOD_S = 1.0
 LOG_PERIOD_S = 5.0
 MOST_REFUSALS, REFUSALS_A_SECOND = 10, 2.0
 """Refused requests that are answered on the log at once, and for good."""
+CATCH_UP = 3
+"""Pairs that wait beside the newest where tracking is fast and was held up: a tenth of a second."""
 
 
 class TrackerNode(LifecycleNode):
@@ -190,7 +192,10 @@ class TrackerNode(LifecycleNode):
                 patient=patient,
             )
             self._worker = Worker(
-                self._processor, self._worker_failed, keep=settings.queue_size if patient else 1
+                self._processor,
+                self._worker_failed,
+                keep=settings.queue_size if patient else 1,
+                catch_up=0 if patient else CATCH_UP,
             )
             self._inputs = Subscriptions(
                 self,

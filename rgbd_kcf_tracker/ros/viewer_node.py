@@ -3,8 +3,8 @@
 
 """The page over a running tracker: a node of its own that only listens and asks.
 
-It subscribes to the images while somebody looks and to nothing larger than a box while nobody does,
-in another process than the tracker, which neither waits for it nor knows of it.
+It subscribes to the images while somebody looks and to nothing larger than answers in words while
+nobody does, in another process than the tracker, which neither waits for it nor knows of it.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import queue
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PointStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -25,8 +26,9 @@ from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.live.settings import RAW
+from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.parameters import ParameterInfo, describe
 from rgbd_kcf_tracker.recordings.images import (
     decode_color,
@@ -38,7 +40,12 @@ from rgbd_kcf_tracker.recordings.messages import intrinsics_from_info, stamp_of,
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
-from rgbd_kcf_tracker.view.live_page import LivePage, ViewerParameters, node_parameter
+from rgbd_kcf_tracker.view.live_page import (
+    EVERYONE,
+    LivePage,
+    ViewerParameters,
+    node_parameter,
+)
 
 POLL_S = 0.05
 SETTINGS_S = 2.0
@@ -68,19 +75,23 @@ class ViewerNode(Node):
         self.settings = self._declared()
         tracker = self.settings.tracker.rstrip('/')
         # Its full name, as diagnostics and messages to people have it.
-        self._tracker = self.resolve_topic_name(f'{tracker}/box').removesuffix('/box')
+        self._tracker = self.resolve_topic_name(f'{tracker}/state').removesuffix('/state')
         self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
         light = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
         self.create_subscription(DiagnosticArray, f'{tracker}/state', self._on_state, light)
+        self.create_subscription(
+            PoseWithCovarianceStamped, f'{tracker}/pose_with_covariance', self._on_pose, light
+        )
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._init = self.create_publisher(RegionOfInterest, f'{tracker}/init', 10)
-        self._init_point = self.create_publisher(PointStamped, f'{tracker}/init_point', 10)
+        self._add = self.create_publisher(RegionOfInterest, f'{tracker}/add', 10)
         self._remove = self.create_publisher(UInt32, f'{tracker}/remove', 10)
         self._remote = AsyncParameterClient(self, tracker)
         self._images: list[Any] = []
         self._depths: dict[int, Any] = {}
         self._colors: dict[int, Any] = {}
         self._camera: tuple[Intrinsics, int, int] | None = None
+        self._frame_id = ''
         self._unwatched = 0.0
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._poll, clock=steady)
@@ -99,8 +110,15 @@ class ViewerNode(Node):
     # -- what comes -------------------------------------------------------------------------------
 
     def _on_state(self, message: DiagnosticArray) -> None:
+        self._frame_id = message.header.frame_id
         with suppress(RgbdKcfError):  # of somebody else's
             self.page.answer(stamp_of(message), tracks_of_state(message))
+
+    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
+        # In another frame (the tracker's target_frame) its axes are not the picture's.
+        if message.header.frame_id == self._frame_id:
+            spread = np.reshape(message.pose.covariance, (6, 6))[:3, :3]
+            self.page.covariance(stamp_of(message), tuple(float(v) for v in spread.ravel()))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -214,21 +232,26 @@ class ViewerNode(Node):
     def _carry_out(self, command: Command) -> None:
         values = command.values
         if command.do == 'box':
-            x, y = max(round(values['x']), 0), max(round(values['y']), 0)
-            width, height = round(values['width']), round(values['height'])
-            if not (0 < width < 2**31 and 0 < height < 2**31 and x < 2**31 and y < 2**31):
-                raise ParameterError('that box has no size')
-            self._init.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+            box = Box(*(values[name] for name in ('x', 'y', 'width', 'height')))
+            self._add.publish(_region(box))
         elif command.do == 'point':
-            message = PointStamped()
-            message.point.x, message.point.y = values['x'], values['y']
-            self._init_point.publish(message)
+            if self.page.frame is None:
+                raise ParameterError('no picture has come yet')
+            box = surface_at(self.page.frame, values['x'], values['y'])
+            self._add.publish(_region(box))
+        elif command.do == 'follow':
+            # A new choice of one who is followed already keeps its id.
+            self._init.publish(_region(self.page.box_of(values['id'])))
         elif command.do == 'remove':
             if not self._remove.get_subscription_count():
                 raise ParameterError(f'{self._tracker} does not answer: is it running?')
-            if not 0 < values['id'] < 2**32:
+            if not 0 <= values['id'] < 2**32:
                 raise ParameterError(f'there is no target {values["id"]}')
             self._remove.publish(UInt32(data=values['id']))
+        elif command.do == 'rename':
+            self.page.rename(values['id'], values['name'])
+        elif command.do == 'everyone':
+            self._set([Parameter(EVERYONE, value=values['value'])])
         elif command.do in ('variant', 'parameter'):
             name, value = node_parameter(command, self.page.variant)
             self._set([Parameter(name, value=value)])
@@ -260,7 +283,7 @@ class ViewerNode(Node):
         if not self.page.board.watched or not self._remote.services_are_ready():
             return
         variant = self.page.variant
-        names = ['variant']
+        names = ['variant', EVERYONE]
         names += [f'{variant}.{i.name}' for i in describe(type(default_parameters(variant)))]
 
         def told(future: Any) -> None:
@@ -272,6 +295,19 @@ class ViewerNode(Node):
                 }
 
         self._remote.get_parameters(names, callback=told)
+
+
+def _region(box: Box) -> RegionOfInterest:
+    """A box as the tracker takes it, in whole pixels.
+
+    Raises:
+        ParameterError: where it has no size.
+    """
+    x, y, width, height = (round(value) for value in box.as_tuple())
+    x, y = max(x, 0), max(y, 0)
+    if not (0 < width < 2**31 and 0 < height < 2**31 and x < 2**31 and y < 2**31):
+        raise ParameterError('that box has no size')
+    return RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height)
 
 
 def _descriptor(info: ParameterInfo) -> Any:

@@ -33,6 +33,8 @@ Array = npt.NDArray[Any]
 
 ONE_THING = 0.8
 """Overlap from which two silhouettes that were weighed are one thing, which was cut in two ways."""
+ONE_BOX = 0.98
+"""Likewise of the boxes that they would have given."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +133,10 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
         mask = np.zeros(scene.view.shape, bool)
         rows, cols = seen.mask.shape
         mask[seen.top : seen.top + rows, seen.left : seen.left + cols] = seen.mask
-        if any(_overlap(mask, other.mask) > ONE_THING for other in considered):
+        if any(
+            _overlap(mask, other.mask) > ONE_THING or box.iou(other.box) > ONE_BOX
+            for other in considered
+        ):
             continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
         considered.append(Considered(box, float(candidate.probability), cues, mask))

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import queue
 import time
@@ -13,8 +14,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
 from rgbd_kcf_tracker.parameters import Parameters, parameter
 from rgbd_kcf_tracker.recordings.results import HEADER, row
@@ -25,11 +27,14 @@ from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.showing import Detail, Seen, show
 
+EVERYONE = 'follow_everyone'
+"""The node's parameter that has it follow people whom nobody chose."""
 STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
 """What an answer takes its time for, as the node's diagnostics tell, each a median."""
 _ANSWERS = 64
 _MOST_ROWS = 200_000
 _MOST_COMMANDS = 64
+_MOST_NAMES = 200
 
 
 @dataclass(frozen=True)
@@ -73,17 +78,18 @@ class LivePage:
         self.values: dict[str, Any] = {}
         self._title, self._period = title, 1 / rate_hz
         self._detail = detail
-        self._answers: OrderedDict[int, list[Track]] = OrderedDict()
+        self._answers: OrderedDict[int, tuple[Track, ...]] = OrderedDict()
         self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
         self._count = 0
         self._origin_ns: int | None = None
-        self._chosen = 0
+        self._covariance: tuple[int, tuple[float, ...]] | None = None
+        self._frame: Frame | None = None
         self._figures: dict[str, str] = {}
         self._lately = 0
         self._word = ''
         self._said = 0.0
         self._shown_at = 0.0
-        self._name = 'target'
+        self._names: OrderedDict[int, str] = OrderedDict()
 
     # -- what the page asks -----------------------------------------------------------------------
 
@@ -101,7 +107,7 @@ class LivePage:
             'live': True,
             'frames': 0,
             'variants': describe_variants(),
-            'several': False,
+            'several': True,
             'stages': STAGES,
         }
 
@@ -124,12 +130,48 @@ class LivePage:
         return yaml_of(variant, default_parameters(variant).replace(**known))
 
     @property
+    def everyone(self) -> bool:
+        """Whether the node follows people whom nobody chose, as far as it has told."""
+        return bool(self.values.get(EVERYONE, False))
+
+    @property
+    def frame(self) -> Frame | None:
+        """The frame that was put up last."""
+        return self._frame
+
+    @property
     def variant(self) -> str:
         """The node's, the default before it has told."""
         name = self.values.get('variant', DEFAULT_VARIANT)
         return name if name in VARIANTS else DEFAULT_VARIANT
 
     # -- what the node says -----------------------------------------------------------------------
+
+    def covariance(self, stamp_ns: int, values: tuple[float, ...]) -> None:
+        """Of the chosen target's position, ``(3, 3)`` row by row, from ``~/pose_with_covariance``.
+
+        It comes a moment after the ``~/state`` of the same frame.
+        """
+        self._covariance = (stamp_ns, values)
+
+    def rename(self, number: int, name: str) -> None:
+        """Call a target by a name, in this page alone; the first two hundred are kept."""
+        if name:
+            self._names[number] = name
+            while len(self._names) > _MOST_NAMES:
+                self._names.popitem(last=False)
+
+    def box_of(self, number: int) -> Box:
+        """Where a target was in the last answer.
+
+        Raises:
+            BoxError: where it has no box.
+        """
+        tracks = next(reversed(self._answers.values()), ())
+        box = next((track.box for track in tracks if track.id == number), None)
+        if box is None:
+            raise BoxError('not in sight now: try again when it is')
+        return box
 
     def figures(self, values: Mapping[str, str]) -> None:
         """What ``/diagnostics`` says of the node."""
@@ -138,22 +180,21 @@ class LivePage:
         self._figures = dict(values)
 
     def answer(self, stamp_ns: int, tracks: Sequence[Track]) -> None:
-        """``~/state``: the targets of one frame, the chosen one first."""
-        followed = [track for track in tracks if track.state is not TrackState.IDLE]
-        self._answers[stamp_ns] = followed
-        self._chosen = tracks[0].id if tracks else 0
+        """``~/state``: the answer to a frame, the chosen target first."""
+        tracks = tuple(track for track in tracks if track.state is not TrackState.IDLE)
+        self._answers[stamp_ns] = tracks
         while len(self._answers) > _ANSWERS:
             self._answers.popitem(last=False)
         if self._origin_ns is None or stamp_ns < self._origin_ns:
             self._origin_ns = stamp_ns
             self.board.rewind([])
         self._count += 1
-        self._rows.extend((self._count - 1, stamp_ns, track) for track in followed)
+        self._rows.extend((self._count - 1, stamp_ns, track) for track in tracks)
         entry = {
             't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
             'targets': [
                 (t.id, t.state.value, t.score if t.box else None, 0, None, None, t.position)
-                for t in followed
+                for t in tracks
             ],
             **{stage: _number(self._figures.get(f'{stage}_median_ms')) for stage in STAGES},
         }
@@ -168,16 +209,26 @@ class LivePage:
     def image(self, frame: Frame, stamp_ns: int) -> None:
         """Put up an image with the answer to it, or the last one before."""
         self._shown_at = time.monotonic()
-        answer = self._answers.get(stamp_ns)
-        if answer is None:
-            answer = next(reversed(self._answers.values()), [])
+        self._frame = frame
+        latest = next(reversed(self._answers.values()), ())
+        answer = self._answers.get(stamp_ns, latest)
         tracks = {track.id: track for track in answer}
+        if answer and self._covariance is not None and not answer[0].box:
+            first = dataclasses.replace(answer[0], covariance=self._covariance[1])
+            tracks[first.id] = first
+        # Beside everyone the chosen one alone was asked for, as far as the wire tells.
+        chosen = frozenset(list(tracks)[:1] if self.everyone else tracks)
+        names = {
+            key: self._names.get(key, f'{"target" if key in chosen else "person"} {key}')
+            for key in tracks
+        }
         origin = stamp_ns if self._origin_ns is None else self._origin_ns
         variant = self.variant
         prefix = f'{variant}.'
         status = {
             'time': round((stamp_ns - origin) * 1e-9, 3),
             'playing': True,
+            'everyone': self.everyone,
             'busy': '',
             'word': self._word if time.monotonic() - self._said < 1.0 else '',
             'variant': variant,
@@ -191,8 +242,6 @@ class LivePage:
             status['latency'] = round(_number(self._figures['latency_median_ms']), 1)
         if 'dropped' in self._figures:
             status['dropped'] = int(_number(self._figures['dropped']))
-        names = {who: self._name if who == self._chosen else str(who) for who in tracks}
-        chosen = frozenset({self._chosen})
         header, blobs = show(Seen(frame, tracks, names, chosen, status=status), self._detail)
         self.board.show(header, blobs)
 

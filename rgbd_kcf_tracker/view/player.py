@@ -246,7 +246,8 @@ class Player:
         elif command.do == 'remove':
             self._remove(values['id'])
         elif command.do == 'rename':
-            if values['name']:
+            passed = self._passed.get(self._shown)
+            if values['name'] and passed is not None and values['id'] in passed.tracks:
                 self._names[values['id']] = values['name']
         elif command.do == 'variant':
             if values['name'] not in VARIANTS:
@@ -283,7 +284,8 @@ class Player:
             begun = time.monotonic()
             for number in range(self._front + 1, wanted + 1):
                 self._track(number, self._read(number))
-                if time.monotonic() - begun > 0.5:
+                # The last one is shown when its figures are on the board too.
+                if number < wanted and time.monotonic() - begun > 0.5:
                     begun = time.monotonic()
                     self._busy = f'tracking up to frame {wanted}: at {number}'
                     self._shown = number

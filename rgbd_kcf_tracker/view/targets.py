@@ -56,6 +56,8 @@ class Targets:
         self._ids: dict[int, int] = {}
         """Of the page's ids those within the set; two may be one person."""
         self._chosen: set[int] = set()
+        self._present: tuple[int, ...] = ()
+        """Ids of those whom the last frame told of."""
 
     @property
     def everyone(self) -> bool:
@@ -114,6 +116,7 @@ class Targets:
         for inner, track in tracks.items():
             if inner not in taken:
                 found[self._number_of(inner)] = track
+        self._present = tuple(found)
         return found
 
     def resume(self, tracks: dict[int, Track], before: Mapping[int, Track]) -> dict[int, Track]:
@@ -134,11 +137,13 @@ class Targets:
                         self._ids[name] = self._ids.pop(number)
                         break
             renamed[name] = track
+        self._present = tuple(renamed)
         return renamed
 
     def insights(self) -> Mapping[int, Insight]:
         """What is known of each after the last frame."""
-        return {number: insight_in(self._set, inner) for number, inner in self._ids.items()}
+        known = {*self._present, *self._chosen}
+        return {n: insight_in(self._set, inner) for n, inner in self._ids.items() if n in known}
 
     def _number_of(self, inner: int) -> int:
         """The id of somebody of the set, a new one where there is none."""

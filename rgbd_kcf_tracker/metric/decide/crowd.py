@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.metric.identity.gallery import Looks, View, similarity
+from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
@@ -315,12 +315,13 @@ class Crowd:
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
         newcomer = account.people[row]
+        shows = min(1.0, account.sights[column].view.total / WHOLE_AREA) ** 2
         for other, person in enumerate(account.people[: len(account.looks)]):
             if other == row or person.number in newcomer.met:
                 continue
             gone = person.seen_at < newcomer.first_seen
             if account.time - person.seen_at > REUNION if person.chosen else gone:
-                newcomer.resembled(person.number, float(account.looks[other, column]))
+                newcomer.resembled(person.number, float(account.looks[other, column]), shows)
 
     def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
         odds = np.zeros((len(self.people), len(sights)))
@@ -398,12 +399,13 @@ class Crowd:
             alike = [
                 (newcomer.resembles(person.number), index)
                 for index, person in enumerate(account.people)
-                if not person.chosen
-                and person.number not in newcomer.met
-                and person.seen_at < newcomer.first_seen
+                if person.number not in newcomer.met
+                and (person.chosen or person.seen_at < newcomer.first_seen)
             ]
             alike.sort(reverse=True)
             if not alike or alike[0][0] < RETURN + SAME_AGAIN:
+                continue
+            if account.people[alike[0][1]].chosen:
                 continue
             if len(alike) > 1 and alike[1][0] > alike[0][0] - SAME_AGAIN:
                 continue

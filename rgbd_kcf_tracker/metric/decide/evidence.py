@@ -34,6 +34,8 @@ class Evidence:
         missing: True where the target should be in sight at the place where it is expected.
         inland: share of the body that was outside the image when it was last seen, 0 to 1, for a
             candidate that does not touch the image's edge; 0 for one that does.
+        emerged: True where the candidate was first seen away from the image's edge: whoever does
+            not come in from there was here before.
         look: log-odds of its look by the target's gallery.
         mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
         rival: log-odds that it is somebody else, at least 0.
@@ -47,6 +49,7 @@ class Evidence:
     gone: float
     missing: bool
     inland: float
+    emerged: bool
     look: float
     mine: float
     rival: float
@@ -79,6 +82,7 @@ class Evidence:
                 away * less,
                 float(self.missing),
                 away * self.inland,
+                away * float(self.emerged),
                 look,
                 away * look,
                 mine,
@@ -92,21 +96,22 @@ class Evidence:
 
 WEIGHTS = np.array(
     (
-        -0.43, -1.25, -0.10, -1.72, -3.22, 0.32, -2.48, -0.49, 2.12, -0.22, -0.30, 0.87,
-        0.06, 0.25, 0.19, -0.05, -0.18, 2.34,
+        -0.43, -1.25, -0.10, -1.72, -3.22, 0.32, -2.48, -0.49, 2.12, -0.22, -0.30, 0.00,
+        0.87, 0.06, 0.25, 0.19, -0.05, -0.18, 2.34,
     )
 )  # fmt: skip
 
 CUES = (
     ('place', (0, 1, 2)),
-    ('look', (11, 12)),
-    ('who stands there', (13, 14)),
-    ('somebody else', (15, 16)),
+    ('look', (12, 13)),
+    ('who stands there', (14, 15)),
+    ('somebody else', (16, 17)),
     ('size', (3, 4, 5, 8)),
     ('time hidden', (6, 7)),
     ('should be in sight', (9,)),
     ('left the image', (10,)),
-    ('to begin with', (17,)),
+    ('came from behind', (11,)),
+    ('to begin with', (18,)),
 )
 """What the regression's inputs are about, by their places in it."""
 

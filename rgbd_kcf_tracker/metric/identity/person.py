@@ -28,6 +28,8 @@ ROOM_AREA = 16.0
 """Square metres of floor that a camera sees: a stranger may be anywhere in it."""
 FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
+ENOUGH = 1.5
+"""Sightings, counted by how much showed, from which somebody is taken to be another."""
 AGAIN = 0.25
 """What twice as many sightings say more, as a share of what one says."""
 TRAVELLED = 0.5
@@ -67,7 +69,7 @@ class Person:
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
-        self._resembles: dict[int, tuple[float, int]] = {}
+        self._resembles: dict[int, tuple[float, float]] = {}
         self.gallery = Gallery()
 
     @property
@@ -91,24 +93,31 @@ class Person:
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
 
-    def resembled(self, other: int, odds: float) -> None:
-        """Take log-odds of a sighting of this one to look like another, who is not in view."""
-        total, count = self._resembles.get(other, (0.0, 0))
-        self._resembles[other] = total + odds, count + 1
+    def resembled(self, other: int, odds: float, weight: float) -> None:
+        """Take log-odds of a sighting of this one to look like another, who is not in view.
+
+        Args:
+            other: the number of the other.
+            odds: log-odds.
+            weight: how much of this one showed, 0 to 1: a part that is seen past somebody else has
+                colours of his as well.
+        """
+        total, count = self._resembles.get(other, (0.0, 0.0))
+        self._resembles[other] = total + weight * odds, count + weight
 
     def resemblance(self, other: int) -> float | None:
         """Mean log-odds, over all sightings, of looking like another; None if never compared."""
-        total, count = self._resembles.get(other, (0.0, 0))
-        return total / count if count else None
+        total, count = self._resembles.get(other, (0.0, 0.0))
+        return total / count if count > 0 else None
 
     def resembles(self, other: int) -> float:
-        """Log-odds, by all sightings together, of looking like another; 0 if never compared.
+        """Log-odds, by all sightings together, of looking like another; 0 after less than two.
 
         Sightings of one walk say little more than one of them: that two people wear the same does
         not change from frame to frame.
         """
-        total, count = self._resembles.get(other, (0.0, 0))
-        return total / count * (1 + AGAIN * float(np.log2(count))) if count > 1 else 0.0
+        total, count = self._resembles.get(other, (0.0, 0.0))
+        return total / count * (1 + AGAIN * float(np.log2(count))) if count >= ENOUGH else 0.0
 
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""

@@ -61,6 +61,7 @@ function redraw() {
   page.trails = trailsOf(page.entries, shown.time);
   drawPicture($('picture'), page.bitmaps.color, shown, page.trails, page.drag);
   drawDepth($('depth'), page.bitmaps.depth, shown);
+  $('truth').hidden = !shown.truth;
   $('far').textContent = shown.far ? `dark 0 m, bright ${shown.far} m` : '';
   drawAbove($('above'), shown, page.points, page.trails);
   for (const target of shown.targets) page.names.set(target.id, target.name);
