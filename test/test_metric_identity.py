@@ -133,7 +133,7 @@ def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
 def test_height_speaks_for_the_same_and_against_another():
     assert height_log_odds(None, 1.7) == height_log_odds(1.7, None) == 0.0
     assert height_log_odds(1.72, 1.72) > height_log_odds(1.72, 1.75) > 0
-    assert height_log_odds(1.55, 1.85) < -1
+    assert height_log_odds(1.55, 1.85) < -0.5
     # Somebody may sit down, so that no height alone can refuse him.
     assert height_log_odds(1.1, 1.85) > -4
 
@@ -215,12 +215,17 @@ def test_a_person_stays_in_the_world_while_the_camera_turns():
     assert one.last is None
 
 
-def test_resemblance_is_the_mean_over_all_sightings():
+def test_resemblance_is_the_mean_over_all_sightings_by_what_they_show():
     one = Person(1, np.zeros(2), 0.0)
     assert one.resemblance(7) is None
     for odds in (3.0, -1.0, 1.0):
-        one.resembled(7, odds)
+        one.resembled(7, odds, 1.0)
     assert one.resemblance(7) == pytest.approx(1.0)
+    one.resembled(7, -100.0, 0.0)
+    assert one.resemblance(7) == pytest.approx(1.0)
+    # More sightings say more, but by far not as many times more.
+    assert 1.0 < one.resembles(7) < 2.0
+    assert one.resembles(8) == 0.0
 
 
 # -- everyone together ----------------------------------------------------------------------------

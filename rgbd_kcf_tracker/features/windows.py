@@ -94,9 +94,7 @@ def sampled(
     return result
 
 
-def _shown(
-    color: Image, cx: float, cy: float, side: float, margin: int
-) -> tuple[Image, int, int]:
+def _shown(color: Image, cx: float, cy: float, side: float, margin: int) -> tuple[Image, int, int]:
     """The part of the image that a window shows, at least one pixel, and its top-left corner.
 
     Where the image goes on there, ``margin`` more pixels are shown to the right and below.

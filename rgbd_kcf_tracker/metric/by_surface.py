@@ -327,6 +327,7 @@ class BySurface:
             look=claim.look if self._parameters.use_color else 0.0,
             mine=claim.mine if self._parameters.use_others else 0.0,
             rival=claim.rival if self._parameters.use_others else 0.0,
+            assigned=claim.assigned if self._parameters.use_others else 0,
             room=claim.room if self._parameters.use_room else 0.0,
         )
         return Candidate(seen, placed, evidence, probability(evidence))

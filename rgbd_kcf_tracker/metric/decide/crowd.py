@@ -84,12 +84,14 @@ class Claim:
             target; 0 where it is part of none.
         rival: log-odds that it is somebody else who was seen beside the target, at least 0:
             somebody new is always possible.
+        assigned: 1 where its figure is explained as the target, -1 as somebody else, 0 as neither.
         room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
     """
 
     look: float
     mine: float
     rival: float
+    assigned: int
     room: float
 
 
@@ -106,6 +108,7 @@ class Account:
         looks: ``(m, n)`` the part of the look and the height in them.
         settled: whether the room has been seen for long enough to tell what stands before it.
         owner: for each sight the index among ``people``, or -1.
+        verdict: the same as the frame explains itself best, who was chosen and is away included.
     """
 
     scene: Scene
@@ -116,6 +119,7 @@ class Account:
     looks: FloatArray
     settled: bool
     owner: list[int] = field(default_factory=list)
+    verdict: list[int] = field(default_factory=list)
     _which: npt.NDArray[np.int16] | None = None
 
     @property
@@ -175,13 +179,16 @@ class Account:
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
+        assigned = 0
         if index >= 0:
+            if self.verdict[index] >= 0:
+                assigned = 1 if self.people[self.verdict[index]] is person else -1
             for row, other in enumerate(self.people[: len(self.odds)]):
                 if other is person:
                     mine = float(self.odds[row, index])
                 elif other.number in person.met:
                     rival = max(rival, float(self.odds[row, index]))
-        return Claim(look, mine, rival, self._room_beside(person, seen))
+        return Claim(look, mine, rival, assigned, self._room_beside(person, seen))
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
@@ -299,17 +306,15 @@ class Crowd:
         settled = self._frames > SETTLED
         odds, looks = self._odds(sights, time)
         account = Account(scene, time, sights, list(self.people), odds, looks, settled)
-        account.owner = [-1] * len(sights)
-        if odds.size:
-            # Whoever was chosen and has been away comes back as a stranger first, until his looks
-            # have borne out over some sightings who he is.
-            away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
-            open_odds = np.where(np.array(away)[:, None], NEW - 1, odds)
-            rows, columns = linear_sum_assignment(-np.maximum(open_odds - NEW, 0))
-            for row, column in zip(rows, columns, strict=True):
-                if open_odds[row, column] > NEW:
-                    account.owner[column] = int(row)
-                    self._compare(account, int(row), column)
+        account.verdict = _assigned(odds, len(sights))
+        # Whoever was chosen and has been away comes back as a stranger first, until his looks have
+        # borne out over some sightings who he is.
+        away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
+        open_odds = np.where(np.array(away)[:, None], NEW - 1, odds) if any(away) else odds
+        account.owner = _assigned(open_odds, len(sights)) if any(away) else list(account.verdict)
+        for column, row in enumerate(account.owner):
+            if row >= 0:
+                self._compare(account, row, column)
         return account
 
     def _compare(self, account: Account, row: int, column: int) -> None:
@@ -469,3 +474,14 @@ class Crowd:
         whole = seen.area > WHOLE and headed and alone
         if whole or not person.gallery.views:
             person.gallery.learn(view)
+
+
+def _assigned(odds: FloatArray, sights: int) -> list[int]:
+    """For each sight who it is by the assignment that explains most, -1 for somebody new."""
+    owner = [-1] * sights
+    if odds.size:
+        rows, columns = linear_sum_assignment(-np.maximum(odds - NEW, 0))
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+            if odds[row, column] > NEW:
+                owner[column] = row
+    return owner

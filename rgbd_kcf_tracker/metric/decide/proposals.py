@@ -222,9 +222,11 @@ def gathered(
     inside = (boxes[:, 0] >= left) & (boxes[:, 0] + boxes[:, 2] <= right)
     inside &= (boxes[:, 1] >= top) & (boxes[:, 1] + boxes[:, 3] <= bottom)
     inside &= np.abs(surfaces.depth - seen.depth) < 0.2 + 0.02 * seen.depth
-    inside &= (surfaces.pixels >= 3) & (_shares(scene, others) < 0.5)
+    inside &= surfaces.pixels >= 3
     inside[0] = False
     inside[seen.label] = False
+    if inside.any() and others.any():
+        inside &= _shares(scene, others) < 0.5
     more = boxes[inside]
     if not len(more):
         return None

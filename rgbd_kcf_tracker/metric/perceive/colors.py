@@ -34,6 +34,16 @@ _TINT = np.minimum(
     TINTS / 2 * (1 + np.tanh(np.arange(-_TOP, _TOP + 1) * (STEEPNESS / _STEPS))), TINTS - 1
 ).astype(np.int32)
 _TINT_OF_RED = _TINT * TINTS
+
+
+def _blur(levels: int) -> npt.NDArray[np.float32]:
+    """The symmetric matrix that shares each of ``levels`` counts with its neighbours."""
+    beside = np.eye(levels, k=1) + np.eye(levels, k=-1)
+    beside[0, 0] = beside[-1, -1] = 1.0
+    return (0.5 * np.eye(levels) + 0.25 * beside).astype(np.float32)
+
+
+_BLUR_LEVEL, _BLUR_TINTS = _blur(LIGHTNESS), np.kron(_blur(TINTS), _blur(TINTS))
 _LUMA = np.array([[0.11, 0.59, 0.30]], np.float32)
 """Shares of blue, green and red in lightness (ITU-R BT.601, rounded)."""
 
@@ -80,17 +90,9 @@ def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     Returns:
         The same shape.
     """
-    cube = counts.reshape(-1, LIGHTNESS, TINTS, TINTS)
-    for axis in (1, 2, 3):
-        moved = np.moveaxis(cube, axis, 0)
-        out = moved * np.float32(0.5)
-        out[1:] += np.float32(0.25) * moved[:-1]
-        out[:-1] += np.float32(0.25) * moved[1:]
-        out[0] += np.float32(0.25) * moved[0]
-        out[-1] += np.float32(0.25) * moved[-1]
-        cube = np.moveaxis(out, 0, axis)
-    result: npt.NDArray[np.float32] = cube.reshape(counts.shape)
-    return result
+    tinted = counts.reshape(-1, TINTS * TINTS) @ _BLUR_TINTS
+    result: npt.NDArray[np.float32] = _BLUR_LEVEL @ tinted.reshape(-1, LIGHTNESS, TINTS * TINTS)
+    return result.reshape(counts.shape)
 
 
 def palette() -> npt.NDArray[np.float32]:
