@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,22 +53,39 @@ class Pose:
         Raises:
             ParameterError: where the quaternion is not of length 1, as one that was never set is.
         """
-        from scipy.spatial.transform import Rotation  # it takes as long to load as all else
-
         length = float(np.linalg.norm(quaternion))
         if not abs(length - 1.0) < 1e-2:
             raise ParameterError(
                 f'quaternion {quaternion} has the length {length:g}: a rotation has 1'
             )
-        matrix = Rotation.from_quat(quaternion).as_matrix()
-        return cls(matrix, np.array(translation, np.float64))
+        x, y, z, w = (value / length for value in quaternion)
+        matrix = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+        return cls(np.array(matrix), np.array(translation, np.float64))
 
     @property
     def quaternion(self) -> tuple[float, float, float, float]:
         """The rotation as ROS writes it: ``(x, y, z, w)``."""
-        from scipy.spatial.transform import Rotation
-
-        x, y, z, w = (float(v) for v in Rotation.from_matrix(self.rotation).as_quat())
+        # By the largest of the four, which is never near zero (Shepperd 1978).
+        m = self.rotation.tolist()
+        trace = m[0][0] + m[1][1] + m[2][2]
+        first = max(range(3), key=lambda axis: m[axis][axis])
+        turned = [0.0, 0.0, 0.0, 0.0]
+        if trace >= m[first][first]:
+            turned[3] = 1 + trace
+            for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                turned[a] = m[c][b] - m[b][c]
+        else:
+            second, third = (first + 1) % 3, (first + 2) % 3
+            turned[first] = 1 + 2 * m[first][first] - trace
+            turned[second] = m[second][first] + m[first][second]
+            turned[third] = m[third][first] + m[first][third]
+            turned[3] = m[third][second] - m[second][third]
+        length = math.sqrt(sum(value * value for value in turned))
+        x, y, z, w = (value / length for value in turned)
         return x, y, z, w
 
     def after(self, other: Pose) -> Pose:

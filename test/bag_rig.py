@@ -18,10 +18,10 @@ from rosbags.typesys import Stores, get_typestore
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.encoding import PackedImage, RawImage, encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.images import metres_from_mm
 from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 
 ROS1 = get_typestore(Stores.ROS1_NOETIC)

@@ -15,7 +15,6 @@ import geometry_msgs.msg
 import numpy as np
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovariance, TransformStamped, Vector3
-from rclpy.node import Node
 from scipy.spatial.transform import Rotation
 from std_msgs.msg import Header
 
@@ -178,11 +177,11 @@ def tf2_ros() -> ModuleType:
 
     class TransformBroadcaster:
         def __init__(self, node: Any) -> None:
-            self._publisher = Node.create_publisher(node, TransformStamped, '/tf', 100)
+            self.pub_tf = node.create_publisher(TransformStamped, '/tf', 100)
 
         def sendTransform(self, transforms: list[TransformStamped]) -> None:
             for transform in transforms:
-                self._publisher.publish(transform)
+                self.pub_tf.publish(transform)
 
     for made in (
         Buffer, TransformListener, TransformBroadcaster,

@@ -264,6 +264,18 @@ def test_foxglove_and_vision_messages_where_they_are_installed(
     assert overlay.points[0].type == 2
 
 
+def test_a_broken_package_is_left_out_with_a_word(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found by a package whose generated library could not be loaded: the node did not start."""
+    monkeypatch.setitem(sys.modules, 'vision_msgs', ModuleType('vision_msgs'))
+    monkeypatch.setitem(sys.modules, 'vision_msgs.msg', vision_messages())
+    monkeypatch.setattr('rgbd_kcf_tracker.ros.publishers.ROS_TYPES', RosTypes())
+    with running_node(rig, queue_policy='all', init_box=box_text()) as node:
+        rig.play(range(2))
+        assert not node._outputs.wanted('detections')
+
+
 @pytest.mark.skipif(find_spec('vision_msgs') is None, reason='vision_msgs is not installed')
 def test_detections_over_the_wire(rig: Rig) -> None:
     types = import_module('vision_msgs.msg')

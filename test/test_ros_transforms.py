@@ -283,6 +283,13 @@ def test_targets_are_frames(rig: Rig) -> None:
         count = len(heard)
         rig.play(range(5, 7))
         assert len(heard) == count
+        publishers = rig.node.count_publishers('/tf')
+        for _ in range(2):  # a cycle leaves no publisher behind
+            node.trigger_deactivate()
+            node.trigger_cleanup()
+            node.trigger_configure()
+            node.trigger_activate()
+        rig.wait(lambda: rig.node.count_publishers('/tf') == publishers)
 
 
 @pytest.mark.skipif(REAL, reason='tf2_ros is installed')

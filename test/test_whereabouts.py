@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rgbd_kcf_tracker import Box, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.pose import Pose
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
+from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import UNKNOWN_HEADING, Walks
 
@@ -130,12 +130,16 @@ def test_what_is_not_known_is_not_said() -> None:
     assert MAKE.pose(HEADER, where).pose.position.z == 3.0
 
 
-def test_quaternions() -> None:
-    turn = Rotation.from_euler('xyz', (10, 20, 30), degrees=True)
-    x, y, z, w = (float(v) for v in turn.as_quat())
-    pose = Pose.from_quaternion((x, y, z, w), (1.0, 2.0, 3.0))
-    assert pose.rotation == pytest.approx(turn.as_matrix())
-    assert pose.quaternion == pytest.approx((x, y, z, w))
+def test_quaternions_are_those_of_scipy() -> None:
+    turns = [*Rotation.random(200, random_state=1)]
+    turns += [Rotation.from_rotvec(math.pi * axis) for axis in np.eye(3)]  # w is 0
+    turns += [Rotation.from_rotvec([0.0, 0.0, 0.0]), Rotation.from_rotvec([3.1, 0.01, 0.0])]
+    for turn in turns:
+        x, y, z, w = (float(v) for v in turn.as_quat())
+        pose = Pose.from_quaternion((x, y, z, w), (1.0, 2.0, 3.0))
+        assert pose.rotation == pytest.approx(turn.as_matrix(), abs=1e-12)
+        again = Rotation.from_quat(pose.quaternion)
+        assert (again * turn.inv()).magnitude() < 1e-7
     with pytest.raises(ParameterError, match='has the length 0'):
         Pose.from_quaternion((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     with pytest.raises(ParameterError, match='length nan'):

@@ -18,10 +18,10 @@ from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.live.replay_message import Message, Role
 from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
+from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.bag_writer import GENERIC
 from rgbd_kcf_tracker.recordings.bags import BagRecording
 from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES
 from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder

@@ -12,6 +12,7 @@ from typing import Any
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES, register
 from rgbd_kcf_tracker.recordings.encoding import (
     encode_color,
     encode_compressed_color,
@@ -19,7 +20,6 @@ from rgbd_kcf_tracker.recordings.encoding import (
 )
 from rgbd_kcf_tracker.recordings.foxglove import DEFINITIONS, image_annotations
 from rgbd_kcf_tracker.recordings.mcap_writer import DEFAULT_COMPRESSION, McapWriter
-from rgbd_kcf_tracker.recordings.message_types import BAG_TYPES, register
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter
 from rgbd_kcf_tracker.recordings.overlay import draw_track
 from rgbd_kcf_tracker.recordings.track_markers import TrackMarkers

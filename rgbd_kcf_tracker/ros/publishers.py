@@ -44,13 +44,14 @@ TOPICS = {
     'markers': 'visualization_msgs/msg/MarkerArray',
     'camera_info': 'sensor_msgs/msg/CameraInfo',
 }
-DETECTIONS = {
+OPTIONAL = {
     'detections': 'vision_msgs/msg/Detection2DArray',
     'detections3d': 'vision_msgs/msg/Detection3DArray',
+    'annotations': ANNOTATIONS,
 }
+"""Of packages that are not in every ROS 2."""
 ANNOTATED, COMPRESSED = 'image_annotated', 'image_annotated/compressed'
 PICTURES = {ANNOTATED: 'sensor_msgs/msg/Image', COMPRESSED: 'sensor_msgs/msg/CompressedImage'}
-OVERLAY = {'annotations': ANNOTATIONS}
 IN_PICTURE = {'state', 'box', 'occluded', 'roi', 'camera_info'}
 IN_SPACE = frozenset(TOPICS) - IN_PICTURE | {'detections3d'}
 
@@ -76,21 +77,24 @@ class TrackPublishers:
         self._walks = Walks()
         self._markers = TrackMarkers(self._make)
         self._marked = False
-        topics = dict.fromkeys(TOPICS, RESULT_DEPTH) | dict.fromkeys(PICTURES, IMAGE_DEPTH)
-        for optional in (DETECTIONS, OVERLAY):
-            package = next(iter(optional.values())).partition('/')[0]
-            if ROS_TYPES.has(package):
-                topics |= dict.fromkeys(optional, RESULT_DEPTH)
-        kinds = TOPICS | DETECTIONS | OVERLAY | PICTURES
-        self._all = {
-            topic: node.create_lifecycle_publisher(
-                ROS_TYPES.type(kinds[topic]),
-                f'~/{topic}',
-                QoSProfile(depth=depth),
-                event_callbacks=NO_EVENTS,
-            )
-            for topic, depth in topics.items()
-        }
+        self._all: dict[str, Any] = {}
+        for topic, kind in TOPICS.items():
+            self._create(topic, kind, RESULT_DEPTH)
+        for topic, kind in PICTURES.items():
+            self._create(topic, kind, IMAGE_DEPTH)
+        for topic, kind in OPTIONAL.items():
+            package = kind.partition('/')[0]
+            if not ROS_TYPES.has(package):
+                continue
+            try:
+                self._create(topic, kind, RESULT_DEPTH)
+            except Exception as error:  # whatever loading a package that is half there may raise
+                node.get_logger().warning(f'~/{topic} is left out: {package} is broken: {error}')
+
+    def _create(self, topic: str, kind: str, depth: int) -> None:
+        self._all[topic] = self._node.create_lifecycle_publisher(
+            ROS_TYPES.type(kind), f'~/{topic}', QoSProfile(depth=depth), event_callbacks=NO_EVENTS
+        )
 
     def wanted(self, *topics: str) -> bool:
         """Whether somebody subscribes to one of these topics."""
@@ -193,3 +197,5 @@ class TrackPublishers:
         for made in self._all.values():
             self._node.destroy_lifecycle_publisher(made)
         self._all.clear()
+        if self._frames is not None:
+            self._frames.destroy()

@@ -200,7 +200,7 @@ class TargetFrames:
     """
 
     def __init__(self, node: LifecycleNode, settings: NodeParameters) -> None:
-        self._name = settings.tf_name
+        self._node, self._name = node, settings.tf_name
         self._broadcaster = tf2('publish_tf').TransformBroadcaster(node)
 
     def send(
@@ -217,6 +217,12 @@ class TargetFrames:
         ]
         if sent:
             self._broadcaster.sendTransform(sent)
+
+    def destroy(self) -> None:
+        """Send no more; tf2_ros has no way of its own to end a broadcaster."""
+        publisher = getattr(self._broadcaster, 'pub_tf', None)
+        if publisher is not None:
+            self._node.destroy_lifecycle_publisher(publisher)
 
 
 def _words(error: Exception) -> str:
