@@ -120,9 +120,7 @@ class ByLook:
             return
         self._follow_size(frame)
         self._place(box)
-        sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
-        self._appearance.remember_peak(sighting.peak, self._unlearned)
-        self._appearance.learn(frame.color, self._cx, self._cy, self._scale, self._unlearned)
+        self._appearance.attend(frame.color, self._cx, self._cy, self._scale, self._unlearned)
         self._depth = depth_in(frame, box) or self._depth
         self._unlearned = 0.0
 

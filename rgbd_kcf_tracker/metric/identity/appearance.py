@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
-from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
+from rgbd_kcf_tracker.metric.identity.patch import Features, PatchFeatures
 
 Image = npt.NDArray[np.uint8]
 
@@ -46,6 +46,17 @@ class Sighting:
     cy: float
     peak: float
     ratio: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reading:
+    """What a window about ``cx, cy`` shows: features of the filter, and codes of its colours."""
+
+    cx: float
+    cy: float
+    scale: float
+    features: Features
+    codes: npt.NDArray[np.int32]
 
 
 class Appearance:
@@ -113,8 +124,9 @@ class Appearance:
         inside: npt.NDArray[np.bool_] = down[:, None] & across[None, :]
         return inside
 
-    def _window(self, color: Image, cx: float, cy: float, scale: float) -> Image:
-        return resampled(color, cx, cy, self._base * scale, self._pixels)
+    def _read(self, color: Image, cx: float, cy: float, scale: float) -> _Reading:
+        window = resampled(color, cx, cy, self._base * scale, self._pixels)
+        return _Reading(cx, cy, scale, self._features(window), rgb_codes(window))
 
     def posterior(self, color: Image) -> npt.NDArray[np.float32]:
         """How likely each pixel of an image is the target's by its colour, ``(h, w)`` 0 to 1."""
@@ -129,11 +141,13 @@ class Appearance:
             cy: row of the window's middle.
             scale: the target's size against its first one.
         """
-        window = self._window(color, cx, cy, scale)
-        response = self._filter.response(self._features(window))
+        return self._sighted(self._read(color, cx, cy, scale))
+
+    def _sighted(self, read: _Reading) -> Sighting:
+        response = self._filter.response(read.features)
         total = response
         if self._share > 0:
-            posterior = self._colors.of(rgb_codes(window))
+            posterior = self._colors.of(read.codes)
             size = (int(self._target[0]) | 1, int(self._target[1]) | 1)
             mean = cv2.boxFilter(posterior, -1, size, borderType=cv2.BORDER_REPLICATE)
             mean = cv2.resize(mean, (self._cells, self._cells), interpolation=cv2.INTER_AREA)
@@ -142,11 +156,11 @@ class Appearance:
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(total)), total.shape))
         dy = _vertex(total[(i - 1) % n, j], total[i, j], total[(i + 1) % n, j])
         dx = _vertex(total[i, (j - 1) % n], total[i, j], total[i, (j + 1) % n])
-        pixel = self._base * scale / n
+        pixel = self._base * read.scale / n
         peak = float(response[i, j])
         return Sighting(
-            cx + ((j + n // 2) % n - n // 2 + dx) * pixel,
-            cy + ((i + n // 2) % n - n // 2 + dy) * pixel,
+            read.cx + ((j + n // 2) % n - n // 2 + dx) * pixel,
+            read.cy + ((i + n // 2) % n - n // 2 + dy) * pixel,
             peak,
             peak / max(self.mean_peak, 1e-6),
         )
@@ -157,15 +171,22 @@ class Appearance:
 
     def learn(self, color: Image, cx: float, cy: float, scale: float, dt: float | None) -> None:
         """Take the target at ``cx, cy`` as a sample, ``dt`` seconds after the last (None: none)."""
+        self._learned(self._read(color, cx, cy, scale), dt)
+
+    def attend(self, color: Image, cx: float, cy: float, scale: float, dt: float) -> None:
+        """Take the target, which is surely at ``cx, cy``, ``dt`` seconds after the last sample."""
+        read = self._read(color, cx, cy, scale)
+        self.remember_peak(self._sighted(read).peak, dt)
+        self._learned(read, dt)
+
+    def _learned(self, read: _Reading, dt: float | None) -> None:
         if dt is None:
             rate = color_rate = 1.0
         else:
             rate = min(MAX_RATE, 1 - (1 - self._rate) ** (dt / FRAME))
             color_rate = min(MAX_RATE, COLOR_RATE * rate)
-        window = self._window(color, cx, cy, scale)
-        codes = rgb_codes(window)
-        self._colors.learn(codes, self._inner, self._near & ~self._outer, color_rate)
-        self._filter.learn(self._features(window), self._mask(codes), rate)
+        self._colors.learn(read.codes, self._inner, self._near & ~self._outer, color_rate)
+        self._filter.learn(read.features, self._mask(read.codes), rate)
 
     def _mask(self, codes: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
         """Where in the window the filter may look: the pixels of the target's colours."""
