@@ -30,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
+LEAST_FILL = 0.3
+"""Share of the given box that a surface fills of which the box shows only a part."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it."""
 FIRST_SIGMA = 0.05
@@ -125,9 +127,17 @@ class BySurface:
         inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
         iou *= np.bincount(inside.ravel(), minlength=len(scene.surfaces)) > 0
         label = int(np.argmax(iou))
-        if iou[label] < LOCK_IOU:
+        if iou[label] >= LOCK_IOU:
+            return BySurface._within(scene, scene.silhouette(label), box)
+        # Two who touch are one surface: the part of it that the box shows is the target.
+        pixels = np.bincount(inside.ravel(), minlength=len(scene.surfaces))
+        pixels[0] = 0
+        label = int(np.argmax(pixels))
+        large = scene.surfaces.pixels[label] > MOST_SHARE * inside.size
+        if large or iou[label] == 0 or pixels[label] < LEAST_FILL * inside.size:
             return None
-        return BySurface._within(scene, scene.silhouette(label), box)
+        part = BySurface._within(scene, scene.silhouette(label), box)
+        return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None
 
     @staticmethod
     def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
@@ -83,12 +85,14 @@ class Follower:
         self._size_of_image = frame.width, frame.height
         self._mobile = False
         self._since = crowd.time
+        self._about: frozenset[int] = frozenset()
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         self.response: float | None = None
         if account is not None:
             self._lock(account, box)
             self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
+            self._about = _people_about(account, box)
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
@@ -212,7 +216,7 @@ class Follower:
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
-            if unlike or self._stands(account, look.box):
+            if unlike or self._stands(account, look.box) or self._taken(account, look.box):
                 self._look.refuse()
                 look = None
         if look is not None:
@@ -239,6 +243,14 @@ class Follower:
     def _stands(self, account: Account, box: Box) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
         return self._mobile and _room_share(account, box) > STANDING
+
+    def _taken(self, account: Account, box: Box) -> bool:
+        """Whether a box shows somebody who was there before the target was chosen."""
+        index = _shown(account, box)
+        if index < 0 or account.owner[index] < 0:
+            return False
+        owner = account.people[account.owner[index]]
+        return owner.first_seen < self._since and owner.number not in self._about
 
     def _agree(self, account: Account, look: Look | None) -> bool:
         """Go over to the surface once one has borne out the look, or somebody new is there."""
@@ -311,13 +323,33 @@ def _score(look: Look) -> float:
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
 
 
-def _room_share(account: Account, box: Box) -> float:
-    """Share of the middle of a box that shows the room."""
-    scene = account.scene
-    rows, cols = scene.view.shape
-    middle = box.scaled(0.6)
-    step = scene.view.step
+def _part(account: Account, box: Box) -> tuple[slice, slice]:
+    """Rows and columns of the view that the middle of a box covers."""
+    rows, cols = account.scene.view.shape
+    middle, step = box.scaled(0.6), account.scene.view.step
     x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
     y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
-    part = scene.still[y0:y1, x0:x1]
+    return slice(y0, y1), slice(x0, x1)
+
+
+def _shown(account: Account, box: Box) -> int:
+    """Index of the sight that fills most of the middle of a box, -1 for none."""
+    part = account.which[_part(account, box)]
+    if not part.size or not account.sights:
+        return -1
+    counts = np.bincount(part.ravel(), minlength=len(account.sights) + 1)
+    best = int(np.argmax(counts[1:]))
+    return best if counts[best + 1] > 0.5 * part.size else -1
+
+
+def _people_about(account: Account, box: Box) -> frozenset[int]:
+    """Numbers of all of whom something shows in a box: the target may be any of them."""
+    numbers = np.unique(account.which[_part(account, box)])
+    owners = (account.owner[number - 1] for number in numbers.tolist() if number > 0)
+    return frozenset(account.people[owner].number for owner in owners if owner >= 0)
+
+
+def _room_share(account: Account, box: Box) -> float:
+    """Share of the middle of a box that shows the room."""
+    part = account.scene.still[_part(account, box)]
     return float(part.mean()) if part.size else 0.0
