@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
+
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_surface import Candidate
@@ -77,6 +79,11 @@ class MetricTargets:
             self._perceive(frame)
             self._learn()
         follower = Follower(frame, self.account, self._crowd, box, self._parameters)
+        if self.account is not None and follower.seen is not None:
+            # Whoever stood there from the first frame on was taken for a part of the room.
+            mask = np.zeros(self.account.scene.view.shape, np.bool_)
+            mask[follower.seen.rows, follower.seen.cols] = follower.seen.mask
+            self._reader.room.open(mask, self.account.scene.view.depth)
         number = self._name(follower.person)
         self._followers[number] = follower
         return number
