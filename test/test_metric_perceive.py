@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import upright
 from rgbd_kcf_tracker.pose import Pose
 
@@ -39,17 +40,21 @@ def with_thing(z: float = 2.0) -> np.ndarray:
 # -- the room -------------------------------------------------------------------------------------
 
 
+def see(room: Room, depth: np.ndarray, seconds: float, somebody: np.ndarray | None) -> None:
+    room.update(depth, seconds, somebody, surfaces_in(depth, depth > 0, 0.04, 0.03))
+
+
 def known_room(depth: np.ndarray) -> Room:
     room = Room()
     room.restart(depth, NOBODY)
     for _ in range(4):
-        room.update(depth, 0.1, None)
+        see(room, depth, 0.1, None)
     return room
 
 
 def test_what_comes_before_the_room_is_told_from_it():
     room = known_room(wall())
-    room.update(with_thing(), 0.1, None)
+    see(room, with_thing(), 0.1, None)
     assert room.before[THING].all()
     assert room.before.sum() == 60 * 30
     assert (room.depth == WALL).all()
@@ -57,12 +62,29 @@ def test_what_comes_before_the_room_is_told_from_it():
 
 def test_a_farther_place_that_is_revealed_becomes_the_room_when_seen_twice():
     room = known_room(with_thing())
-    room.update(wall(), 0.1, None)
+    see(room, wall(), 0.1, None)
     assert room.depth[50, 70] == pytest.approx(2.0), 'one reading may be noise'
-    room.update(wall(), 0.1, None)
+    see(room, wall(), 0.1, None)
     assert room.depth[THING] == pytest.approx(WALL)
-    room.update(with_thing(), 0.1, None)
+    see(room, with_thing(), 0.1, None)
     assert room.before[THING].all(), 'and what comes back there is before it'
+
+
+def test_where_somebody_stood_from_the_first_frame_the_room_goes_on():
+    room = known_room(with_thing())
+    chosen = np.zeros((ROWS, COLS), bool)
+    chosen[THING] = True
+    room.open(chosen, with_thing())
+    see(room, with_thing(), 0.1, chosen)
+    assert room.before[THING].all(), 'who was chosen stands before the room'
+    # A second later he has gone, and the wall that shows is no farther than he might have stepped.
+    see(room, wall(3.2), 1.0, None)
+    assert room.before[THING].all(), 'a wall that is nowhere else may be he'
+    room = known_room(with_thing())
+    room.open(chosen, with_thing())
+    see(room, with_thing(), 0.1, chosen)
+    see(room, wall(), 1.0, None)
+    assert not room.before.any()
 
 
 def test_what_is_put_down_becomes_the_room_after_a_while_unless_it_is_somebody():
@@ -71,17 +93,17 @@ def test_what_is_put_down_becomes_the_room_after_a_while_unless_it_is_somebody()
         claimed = NOBODY.copy()
         claimed[THING] = somebody
         for _ in range(int((SETTLE - 0.5) / 0.1)):
-            room.update(with_thing(), 0.1, claimed)
+            see(room, with_thing(), 0.1, claimed)
         assert room.before[THING].all(), 'not yet'
         for _ in range(15):
-            room.update(with_thing(), 0.1, claimed)
+            see(room, with_thing(), 0.1, claimed)
         assert room.before[THING].all() == somebody
 
 
 def test_the_clock_of_what_is_put_down_is_the_stamp_not_the_frame():
     room = known_room(wall())
     for _ in range(5):
-        room.update(with_thing(), 1.0, None)
+        see(room, with_thing(), 1.0, None)
     assert not room.before.any()
 
 
@@ -91,11 +113,11 @@ def test_pixels_that_somebody_left_become_room():
     room = Room()
     room.restart(with_thing(), claimed)
     assert room.before[THING].all()
-    room.update(with_thing(), 0.1, claimed)
+    see(room, with_thing(), 0.1, claimed)
     assert room.before[THING].all(), 'he is not the room while he stands there'
-    room.update(wall(), 0.1, claimed)
+    see(room, wall(), 0.1, claimed)
     assert not room.before.any()
-    room.update(wall(), 0.1, None)
+    see(room, wall(), 0.1, None)
     assert room.depth[THING] == pytest.approx(WALL)
 
 
@@ -104,7 +126,7 @@ def test_pixels_that_turn_out_to_be_somebody_are_taken_out_of_the_room():
     claimed = NOBODY.copy()
     claimed[THING] = True
     room.open(claimed, with_thing())
-    room.update(with_thing(), 0.1, None)
+    see(room, with_thing(), 0.1, None)
     assert room.before[THING].all()
     assert room.before.sum() == 60 * 30
 
@@ -119,7 +141,7 @@ def test_the_room_is_seen_from_where_the_camera_has_moved_to():
     agreeing = (np.abs(room.depth - depth) < 0.05) | unknown
     assert agreeing[inner].mean() > 0.99
     assert unknown[:, -3:].all(), 'what comes into view is not known'
-    room.update(depth, 0.1, None)
+    see(room, depth, 0.1, None)
     assert room.before.mean() < 0.01
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
 
 DepthArray = npt.NDArray[np.float32]
@@ -35,6 +36,8 @@ SETTLE = 3.0
 """Seconds for which something that is nobody's must have stood still to become part of the room."""
 AGREEING = 0.5
 """Share of readings where they were from which the camera stands where it stood."""
+MOST = 0.5
+"""Share of a surface that is room from which all of it is."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
@@ -76,6 +79,14 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
     hole[(0, -1), :] = False
     seen[hole] = beside[hole]
     return seen
+
+
+def _mostly(mask: Mask, surfaces: Surfaces) -> Mask:
+    """The pixels of those surfaces of which most lies in a mask, ``(h, w)`` bool."""
+    inside = np.bincount(surfaces.labels[mask], minlength=len(surfaces)) > MOST * surfaces.pixels
+    inside[0] = False
+    result: Mask = inside[surfaces.labels]
+    return result
 
 
 class Room:
@@ -143,7 +154,9 @@ class Room:
         lost: Mask = unknown & ~opened
         return lost
 
-    def update(self, depth: DepthArray, dt: float, somebody: Mask | None) -> None:
+    def update(
+        self, depth: DepthArray, dt: float, somebody: Mask | None, surfaces: Surfaces
+    ) -> None:
         """Compare the next view with the room and learn from it.
 
         Args:
@@ -151,6 +164,7 @@ class Room:
             dt: seconds since the last.
             somebody: ``(h, w)`` bool, pixels that belonged to somebody in the last view, who may
                 stand still for as long as he likes; None for nobody.
+            surfaces: of the view.
         """
         valid = depth > 0
         known = self.depth > 0
@@ -163,11 +177,18 @@ class Room:
         left = open_ & (self._front > 0) & (depth > self._front + leap)
         open_ &= ~left
         before |= open_
-        # Who passes before somebody does not take his place.
-        np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
         farther = both & (nearer < -allowed)
         again = farther & (np.abs(depth - self._farther) <= allowed)
         same = both & ~before & ~farther
+        if open_.any():
+            # What is farther than who stood there, and goes on as the room, is the room.
+            behind = open_ & (depth > self._front + np.float32(LEAP))
+            behind &= _mostly(same, surfaces)
+            before &= ~behind
+            open_ &= ~behind
+            left |= behind
+            # Who passes before somebody does not take his place.
+            np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
         self.depth[same] -= np.float32(BLEND) * nearer[same]
         self.depth[again] = depth[again]
         self._farther = np.where(farther, depth, np.float32(0))

@@ -145,7 +145,7 @@ class SceneReader:
                 self.room.open(people & unknown, view.depth)
                 self._light.restart()
                 somebody = None
-            self.room.update(view.depth, seconds, somebody)
+            self.room.update(view.depth, seconds, somebody, surfaces)
         before = self.room.before
         codes = color_codes(self._light.steadied(image, ~before))
         return Scene(
