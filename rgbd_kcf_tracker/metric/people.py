@@ -95,7 +95,9 @@ def rounded(view: DepthView, seen: Silhouette) -> bool:
     off = z
     for _ in range(FITS):
         # Along a plane the inverse of depth is affine in the pixel; weighted, to fit in metres.
-        plane, *_ = np.linalg.lstsq(pixels[fitted] * z[fitted, None], np.ones(fitted.sum()))
+        plane, *_ = np.linalg.lstsq(
+            pixels[fitted] * z[fitted, None], np.ones(fitted.sum()), rcond=None
+        )
         off = np.abs(1 - z * (pixels @ plane)) * z
         fitted = off <= OUTLIER * np.median(off)
     return bool(np.median(off) > RELIEF + RELIEF_PER_SQUARE_METRE * seen.depth**2)
