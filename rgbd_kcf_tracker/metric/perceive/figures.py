@@ -49,6 +49,8 @@ REACH_ACROSS, REACH_DEEP = 0.2, 0.15
 """Half of a person's breadth and depth in metres: the scales in which pixels are nearest to one."""
 APART = 0.28
 """Metres between the middles of two people, at the least."""
+EVERY = 3
+"""One in so many pixels is enough to tell where the middles of people are."""
 LEAST_SHARE = 0.15
 """Share of a figure's pixels below which a part of it is not somebody."""
 
@@ -167,9 +169,10 @@ def _parted(
     if len(seeds):
         u = seeds[:, 0] * k.fx / np.maximum(seeds[:, 1], 0.2) + k.cx - left
         margin = 0.1 * k.fx / z
-        near, far = np.percentile(ahead[mask], (5, 95))
         inside = (u > -margin) & (u < cols + margin)
-        inside &= (seeds[:, 1] > near - 0.3) & (seeds[:, 1] < far + 0.3)
+        if np.count_nonzero(inside) > 1:
+            near, far = np.percentile(ahead[mask], (5, 95))
+            inside &= (seeds[:, 1] > near - 0.3) & (seeds[:, 1] < far + 0.3)
         seeds = seeds[inside]
     if len(seeds) < 2:
         if cols * z / k.fx < WIDEST:
@@ -178,25 +181,25 @@ def _parted(
         if len(seeds) < 2:
             return [(left, top, mask)]
     v, u_ = np.nonzero(mask)
-    deep = ahead[v, u_].astype(np.float64)
-    across = columns[u_] * depth[v, u_] / k.fx
+    reach = np.array([REACH_ACROSS, REACH_DEEP])
+    points = np.stack((columns[u_] * depth[v, u_] / k.fx, ahead[v, u_]), axis=1) / reach
+    seeds = seeds / reach
+    some = points[::EVERY]
     for _ in range(3):
-        away = np.square((across[:, None] - seeds[:, 0]) / REACH_ACROSS)
-        away += np.square((deep[:, None] - seeds[:, 1]) / REACH_DEEP)
-        owner = np.argmin(away, axis=1)
+        owner = _nearest(some, seeds)
         count = np.bincount(owner, minlength=len(seeds))
-        keep = count > LEAST_SHARE * len(v) / len(seeds)
+        keep = count > LEAST_SHARE * len(some) / len(seeds)
         if not keep.all():
             seeds = seeds[keep]
             if len(seeds) < 2:
                 return [(left, top, mask)]
             continue
-        seeds = np.stack(
-            (np.bincount(owner, across) / count, np.bincount(owner, deep) / count), axis=1
-        )
-    apart = np.hypot(*(seeds[:, None] - seeds[None]).transpose(2, 0, 1))
+        sums = [np.bincount(owner, some[:, axis]) for axis in (0, 1)]
+        seeds = np.stack(sums, axis=1) / count[:, None]
+    apart = np.hypot(*((seeds[:, None] - seeds[None]) * reach).transpose(2, 0, 1))
     if (apart[np.triu_indices(len(seeds), 1)] < APART).any():
         return [(left, top, mask)]
+    owner = _nearest(points, seeds)
     parts = []
     for index in range(len(seeds)):
         part = np.zeros_like(mask)
@@ -208,6 +211,12 @@ def _parted(
         y1, x1 = int(v[mine].max()) + 1, int(u_[mine].max()) + 1
         parts.append((left + x0, top + y0, part[y0:y1, x0:x1]))
     return parts
+
+
+def _nearest(points: FloatArray, seeds: FloatArray) -> npt.NDArray[np.intp]:
+    """Index of the seed ``(m, 2)`` that is nearest to each point ``(n, 2)``, ``(n,)``."""
+    away = np.square(seeds).sum(axis=1) - 2 * (points @ seeds.T)
+    return np.asarray(away.argmin(axis=1))
 
 
 def _heads(
