@@ -84,7 +84,8 @@ class Claim:
             target; 0 where it is part of none.
         rival: log-odds that it is somebody else who was seen beside the target, at least 0:
             somebody new is always possible.
-        assigned: 1 where its figure is explained as the target, -1 as somebody else, 0 as neither.
+        assigned: 1 where its figure is explained as the target, -1 as somebody else, 0 as neither;
+            1 for a target that was no figure when it was last seen: nothing then objects.
         room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
     """
 
@@ -156,6 +157,13 @@ class Account:
         best = int(np.argmax(counts[1:]))
         return best if counts[best + 1] > MOST * len(pixels) else -1
 
+    def figure_of(self, seen: Silhouette) -> int:
+        """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
+        index = self.sight_of(seen)
+        if index >= 0 and seen.area < MOST * self.sights[index].figure.seen.area:
+            return -1
+        return index
+
     def look(self, seen: Silhouette) -> View:
         """The look of any silhouette of the frame."""
         for sight in self.sights:
@@ -179,8 +187,9 @@ class Account:
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
-        assigned = 0
+        assigned = 0 if person.figure else 1
         if index >= 0:
+            assigned = 0
             if self.verdict[index] >= 0:
                 assigned = 1 if self.people[self.verdict[index]] is person else -1
             for row, other in enumerate(self.people[: len(self.odds)]):
@@ -277,7 +286,7 @@ class Crowd:
 
     def chosen(self, account: Account, seen: Silhouette) -> Person:
         """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
-        index = account.sight_of(seen)
+        index = account.figure_of(seen)
         if index >= 0 and account.owner[index] >= 0:
             person = account.people[account.owner[index]]
             if account.time == person.seen_at:
@@ -369,7 +378,7 @@ class Crowd:
             seen = targets[person.number]
             if seen is None:
                 continue
-            index = account.sight_of(seen)
+            index = account.figure_of(seen)
             if index >= 0:
                 self._merge(account, row, account.owner[index])
                 account.owner[index] = row
@@ -453,7 +462,7 @@ class Crowd:
         place = account.place(seen)
         if account.time > person.seen_at:
             person.moved_to(place, account.time)
-        person.last = seen
+        person.last, person.figure = seen, index >= 0
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
         if account.settled and seen.area > WHOLE:

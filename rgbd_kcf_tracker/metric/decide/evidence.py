@@ -40,7 +40,8 @@ class Evidence:
         mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
         rival: log-odds that it is somebody else, at least 0.
         assigned: by the joint explanation of the frame, 1 where its figure is the target, -1 where
-            it is somebody else, 0 where it is somebody new or no figure.
+            it is somebody else, 0 where it is somebody new or no figure; 1 for a target that is no
+            figure itself.
         room: share of its pixels that stood still before, for a target that has walked.
     """
 

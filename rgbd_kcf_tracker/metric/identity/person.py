@@ -55,6 +55,7 @@ class Person:
         entered: whether it was first seen at the edge of what the camera sees.
         last: the silhouette of the last sight, None where the camera has moved since.
         upright: whether it ever had the shape of a person.
+        figure: whether it was a figure when it was last seen, and not a thing too small for one.
         met: numbers of those who were seen at the same time, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
     """
@@ -65,7 +66,7 @@ class Person:
         self.first_place, self.travelled = place.copy(), 0.0
         self.seen_at = self.first_seen = time
         self.sightings = 1
-        self.upright = self.mobile = self.entered = False
+        self.upright = self.mobile = self.entered = self.figure = False
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
