@@ -26,7 +26,7 @@ GOOD = Evidence(
     look=3.0,
     mine=5.0,
     rival=0.0,
-    assigned=0,
+    assigned=1,
     room=0.0,
 )
 """What a candidate that fits in every respect is judged by."""

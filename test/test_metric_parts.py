@@ -309,11 +309,11 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
     assert len(GOOD.features()) == len(WEIGHTS)
     assert probability(GOOD) > 0.95
     for worse in (
-        {'step': 60.0, 'stride': 12.0},
-        {'look': -4.0, 'mine': -4.0, 'gone': 3.0},
-        {'look': -4.0, 'mine': -4.0, 'rival': 6.0},
-        {'fraction': 0.05, 'look': 0.0, 'mine': 0.0},
-        {'gone': 4.0, 'look': -2.0, 'mine': -2.0, 'rival': 4.0},
+        {'step': 60.0, 'stride': 12.0, 'assigned': 0},
+        {'look': -4.0, 'mine': -4.0, 'gone': 3.0, 'assigned': 0},
+        {'look': -4.0, 'mine': -4.0, 'rival': 6.0, 'assigned': -1},
+        {'fraction': 0.05, 'look': 0.0, 'mine': 0.0, 'assigned': 0},
+        {'gone': 4.0, 'look': -2.0, 'mine': -2.0, 'rival': 4.0, 'assigned': -1},
     ):
         assert probability(dataclasses.replace(GOOD, **worse)) < 0.5, worse
 

@@ -127,10 +127,12 @@ CUE_WORDS = {
     'look': 'how alike its colours are to those that the target is known by',
     'who stands there': 'how likely the person of whom it is part is the target, by place and look',
     'somebody else': 'how likely that person is somebody else who was seen beside the target',
+    'explained together': 'whether the frame as a whole is explained best where this is the target',
     'size': 'how well its height and visible part fit the body of the target',
     'time hidden': 'how long the target has been away: what comes back is less surely it',
     'should be in sight': 'nothing covers the place where the target was expected',
     'left the image': 'the target left at the edge of the image, but this did not come in there',
+    'came from behind': 'it was first seen away from the image edge, so it was here before',
     'to begin with': 'where all other cues say nothing',
 }
 """What each of :data:`CUES` says."""
