@@ -28,8 +28,7 @@ LARGE_STEP = 0.08
 UNSURE = 0.7
 BETTER = 0.25
 ROUNDS = 3
-"""Times that the size is looked for after a large step: it may have changed by more than the filter's
-range of a sixth."""
+"""Times that the size is looked for after a large step, which may exceed the filter's range."""
 SCALE_RATE = 0.025
 SCALE_TIME = 0.1
 SCALE_RANGE = (0.1, 10.0)
