@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import Recording
 from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters
+from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfParameters
 from rgbd_kcf_tracker.view.explain.depth_pictures import depth_pictures
 from rgbd_kcf_tracker.view.explain.filter_pictures import filter_pictures
 from rgbd_kcf_tracker.view.explain.metric_pictures import metric_chapter
@@ -25,6 +26,7 @@ from rgbd_kcf_tracker.view.explain.page import Chapter
 from rgbd_kcf_tracker.view.explain.particle_pictures import particle_pictures
 
 _RGBD = RgbdParameters()
+_RGBD_PF = RgbdPfParameters()
 VARIANTS = ('kcf', 'rgbd', 'rgbd_pf', 'metric')
 
 
@@ -74,11 +76,15 @@ def explain(
                 'may stand in front of it. The depth at its centre tells the two apart. In each '
                 f'frame (Algorithm 1): the filter looks along the search space. A response above '
                 f'{_RGBD.detect_threshold:g} is the target. Below that, it is still the target '
-                'where the depth at its centre has not changed, by less than '
-                f'{_RGBD.depth_threshold:g} m; else it is hidden: no box is given, nothing is '
-                'learned, and the search space grows. To be taken for the target again without '
-                f'such a response, {(_RGBD.detect_threshold + _RGBD.hidden_response) / 2:g} and '
-                'its own depth are needed. Chapter 4 of the thesis.',
+                'as long as the depth at its centre has not come nearer by '
+                f'{_RGBD.depth_threshold:g} m on average, and not more than '
+                f'{100 * _RGBD.gone_share:g} % of it shows what is farther away; else it is '
+                'hidden: no box is given, nothing is learned, and the search space grows. To be '
+                'taken for the target again without such a response, '
+                f'{(_RGBD.detect_threshold + _RGBD.hidden_response) / 2:g} '
+                f'({_RGBD.hidden_response:g} at the place where it was last seen) and its own '
+                'depth are needed, nearer or farther by less than the same '
+                f'{_RGBD.depth_threshold:g} m. Chapter 4 of the thesis.',
                 depth_pictures(moments), _missing(moments, recording),
             )
         )  # fmt: skip
@@ -88,8 +94,14 @@ def explain(
                 'rgbd_pf', 'Particles carry on where nothing is seen (rgbd_pf)',
                 'A particle is one guess at where the target is, how it moves and how large it is. '
                 'Many of them are kept or dropped by the colours that they find, and say where '
-                'the filter should look next, also while the target is hidden. Chapter 5 of the '
-                'thesis, Algorithm 2.',
+                'the filter should look next. Here the depth is asked before the response: where '
+                'it says that the target is hidden there is no box and nothing is learned, and the '
+                'particles go on with the velocity that they had. The filter then looks at their '
+                'mean, at the heaviest of them, and where the target was last seen; a response of '
+                f'{_RGBD_PF.reacquire_threshold:g} with its own depth is the target again, and one '
+                f'of {_RGBD_PF.accept_threshold:g} at about its distance. After '
+                f'{_RGBD_PF.lost_after:g} s it counts as lost, and in each frame a part of the '
+                'particles is thrown anywhere in the image. Chapter 5 of the thesis, Algorithm 2.',
                 particle_pictures(explain_particles(frames(), box, asked)),
             )
         )  # fmt: skip

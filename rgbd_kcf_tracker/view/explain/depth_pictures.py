@@ -208,9 +208,13 @@ def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
             'D_diff': result.value, 'nearer': result.nearer,
         },
         signs(
-            (r'D_{\mathrm{diff}}', 'what the occlusion is decided by, in metres'),
-            ('D', 'the differences of the picture before, where both patches have a reading and '
-             'nothing was cut away'),
+            (
+                r'D_{\mathrm{diff}}',
+                'the mean difference, in metres; what of it is nearer hides a target that was '
+                'seen, and all of it keeps a hidden one hidden',
+            ),
+            ('D', 'the difference at each sample, as in the adjusting above, where both patches '
+             'have a reading and nothing was cut away'),
         ),
     )  # fmt: skip
 
@@ -243,7 +247,7 @@ def _search_space(moment: Moment, hidden: Moment | None) -> Picture:
         axes.plot(centres, np.full(len(centres), box.cy), '|', color='white', ms=12, mew=3)
         axes.plot(
             centres, np.full(len(centres), box.cy), '|', color=GIVEN, ms=12, mew=1.5,
-            label='windows',
+            label='middles of windows',
         )  # fmt: skip
         axes.set_xlim(-0.5, one.frame.width - 0.5)
         axes.set_ylim(one.frame.height - 0.5, -0.5)
@@ -254,7 +258,8 @@ def _search_space(moment: Moment, hidden: Moment | None) -> Picture:
         '4.8, 4.9', 'search_space', 'The search space',
         'The window slides along the horizontal, because people do not fly; how far grows with the '
         "target's width, so that a near target is not lost and a far one costs no more. While it "
-        'is hidden the space grows with every moment, until the whole image is searched.',
+        'is hidden (occluded) the space grows with every moment, until the whole image is '
+        'searched.',
         r'\mathrm{span} = (s + \lceil v\,t \rceil) \cdot w',
         (name_of(sliding_window.search_span), _SEARCH), plot_style.png(figure), values,
         signs(
@@ -321,7 +326,7 @@ def _responses(shown: list[tuple[str, Moment]]) -> Picture:
         values[f'response_{word.replace(" ", "_")}'] = response
         peaks.append(f'{best.response:.2f} when {word}')
     return Picture(
-        '4.11', 'responses', 'The response of a target that is seen, covered, and hidden',
+        '4.11', 'responses', 'The response of a target that is visible, partly hidden, and hidden',
         f'The highest response is {", ".join(peaks)}: the more is hidden, the lower the hill. '
         'The dashed box is where the best patch lies; above '
         f'{_DEFAULTS.detect_threshold:g} it is the target whatever the depth says, below that '
@@ -356,7 +361,7 @@ def _over_time(moments: DepthMoments) -> Picture:
     low.plot(numbers, difference, color=GIVEN, lw=1.5, label='depth difference')
     low.axhline(
         _DEFAULTS.depth_threshold, color='#555555', lw=1, ls='--',
-        label=f'above {_DEFAULTS.depth_threshold:g} m: hidden',
+        label=f'nearer by {_DEFAULTS.depth_threshold:g} m: hidden',
     )  # fmt: skip
     low.legend(fontsize=8, frameon=False, loc='upper left', ncols=2)
     low.set(ylabel='D_diff (m)', xlabel='frame')
@@ -374,8 +379,9 @@ def _over_time(moments: DepthMoments) -> Picture:
         '', 'over_time', 'Response and depth over time',
         'The two readings that Algorithm 1 decides by, with their thresholds; grey is where the '
         'target counted as hidden, and it is taken back only where both say so, or the response '
-        'is high. The marks are the frames shown above: visible (triangle), partly hidden '
-        '(square), hidden (cross).',
+        f'is high. The difference never goes beyond {_DEFAULTS.depth_cap:g} m, for which each '
+        'sample counts at most; the marks are the frames shown above: visible (triangle), partly '
+        'hidden (square), hidden (cross).',
         '', (_SEARCH, _DIFFERENCE), plot_style.png(figure),
         {'frames': numbers, 'response': response, 'D_diff': difference},
     )  # fmt: skip

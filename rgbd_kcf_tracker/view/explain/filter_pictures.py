@@ -320,11 +320,12 @@ def _features(moment: Moment, number: str, name: str, title: str) -> Picture:
     words = (
         f'Each cell of {CELL_SIZE} x {CELL_SIZE} pixels is described by {hog.shape[0]} numbers '
         'that say which way the edges in it run and how strong they are. The cosine window fades '
-        'them out towards the border, where the shifts of the window wrap round.'
+        'them out towards the border, where the shifts of the window wrap round; drawn is the sum '
+        'of 9 of the numbers, bright where there are strong edges.'
         if name == 'features'
         else f'The window of frame {moment.number}, cut out where the target was in frame '
         f'{moment.number - 1}: it stands a little beside the middle, by as much as it has moved. '
-        'Features and cosine window are made as for the first frame.'
+        'Features and cosine window are made, and drawn, as for the first frame.'
     )
     # The unsigned orientations, 18 to 26: one picture of the edges, brightest where strong.
     figure = plot_style.figure(9.5, 3.4)
@@ -371,17 +372,26 @@ def _training(first: Moment) -> Picture:
     return Picture(
         '', 'training', 'Training',
         'At the left how alike the window is to itself at every shift (the kernel): 1 for no '
-        'shift, less everywhere else. One division per frequency turns that and the labels into '
-        'the coefficients at the right, which is the whole training.',
+        'shift, less everywhere else. What is learned is one coefficient for each shift, such that '
+        'the likenesses times the coefficients add up to the labels (kernel ridge regression); as '
+        'the matrix of all likenesses is circulant, that is one division per frequency, with the '
+        'result at the right (a step of 1 is ten times as much; of the frequencies across half are '
+        'kept, as the others mirror them).',
+        r'(C(k^{xx}) + \lambda I)\,\alpha = y,\quad '
         r'\hat{\alpha} = \frac{\hat{y}}{\hat{k}^{xx} + \lambda}',
         _named(CorrelationFilter.learn, GAUSSIAN), plot_style.png(figure),
         {'kernel': kernel, 'alpha': alpha},
         signs(
-            'alpha', (r'\hat{y}', 'the Fourier transform of the labels'),
-            (r'\hat{k}^{xx}', 'that of the likeness of the window to itself at every shift'),
+            (r'\alpha', "the filter's coefficients, one for each shift of the window"),
+            (r'k^{xx}', 'the likeness of the window to itself at every shift'),
+            (r'C(k^{xx})', 'its circulant matrix: how alike any two shifts are'),
+            ('I', 'the identity matrix: 1 along the diagonal, else 0'),
+            ('y', 'the labels: the wanted answer for each shift'),
+            (r'\hat{\alpha},\ \hat{y},\ \hat{k}^{xx}', 'their Fourier transforms'),
             (
                 r'\lambda',
-                f'{learned.given["self"]["_regularization"]:g}: keeps the coefficients small',
+                f'{learned.given["self"]["_regularization"]:g}: keeps the coefficients small, at '
+                'the price of small errors',
             ),
         ),
     )  # fmt: skip

@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION
 from rgbd_kcf_tracker.metric.decide.evidence import CUE_WORDS
 from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
@@ -87,7 +88,17 @@ def metric_chapter(frames: Iterable[tuple[int, Frame]], box: Box, asked: int) ->
         'The default tracker cuts the depth image into surfaces and asks of each whether it is the '
         'target. What it measures of a surface adds up to log-odds: 0 is even, +3 is 20 to 1 for '
         f'it, -3 is 20 to 1 against. The best one is taken from {_DEFAULTS.acceptance:g} of '
-        'probability on; else the target is hidden, and particles carry on where it may be. The '
+        f'probability on ({_DEFAULTS.recognition:g} where it was away for more than '
+        f'{REUNION:g} s), and if {100 * _DEFAULTS.least_visible:.0f} % of the body or more shows; '
+        'else the target is hidden: no box is given, and particles carry '
+        'on where it may be, by which the place of what comes into view is then judged. Of two '
+        'people the look tells who is who, as long as they look different, and the frame as a '
+        'whole: everyone in view is somebody who was seen before or somebody new, nobody is '
+        'two at once, and of all ways to deal out who is who the one with the highest sum of '
+        'log-odds (of place, look and height) explains the frame. This speaks for a candidate '
+        'that is the target in it, and against one that is somebody else (explained together). '
+        'One that was first seen away from the edge of the image came from behind something, as a '
+        'hidden target does. The '
         'correlation filter is asked only where depth says nothing of the target.',
         pictures, missing.strip(),
     )  # fmt: skip
@@ -182,10 +193,13 @@ def _candidates(seen: _Seen) -> Picture:
     verdict = 'nothing was taken' if track.box is None else 'the first was taken'
     return Picture(
         '', 'candidates', 'Silhouettes, and what speaks for each',
-        f'The silhouettes that could be the target (what is surely somebody else or the room is '
+        'The silhouettes (surfaces, whole or in part, or gathered to one body) that could be the '
+        'target (what is surely somebody else or the room is '
         f'not among them), with the box that each would give; {verdict}. '
         'Bars to the right speak for a candidate and bars to the left against it, and their sum '
-        'is its log-odds.',
+        'is its log-odds; place and size are about 0 where they fit, and the bars of time hidden, '
+        'should be in sight and to begin with are the same for all candidates, so they only say '
+        'whether any is good enough.',
         r'\ln\frac{p}{1-p} = \sum_i w_i f_i', tuple(map(name_of, COMPUTED_BY['considered'])),
         plot_style.png(figure), values,
         signs(
@@ -240,15 +254,21 @@ def _gallery(seen: _Seen) -> Picture:
     axes[1].set_aspect('auto')
     return Picture(
         '', 'gallery', 'The gallery by which it is known',
-        'Of each view that is remembered the body is cut into slices of '
+        'The gallery holds a few views of the target, of when it surely was seen and showed '
+        'something new; of each the body is cut into slices of '
         f'{100 * gallery.SLICE:.0f} cm, and each keeps how often every colour shows in it; drawn '
         'is the mean. A candidate is compared with all views, slice by slice, and the most alike '
-        'one says how likely it is the same person (the cue "look").',
+        'one says how likely it is the same person (the cue "look"; everybody else in view has a '
+        'gallery too).',
         r's = \max_v \sum_k a_k \sum_u \sqrt{p_{k,u}\ q^v_{k,u}}',
         (*map(name_of, COMPUTED_BY['gallery']), name_of(gallery.similarity)),
         plot_style.png(figure), {'colors': stripes},
         signs(
-            ('s', 'the likeness: 1 for the same colours at the same heights'),
+            (
+                's',
+                'the likeness: 1 for the same colours at the same heights; with one view '
+                f'{gallery.EVEN:g} is even, log-odds 0',
+            ),
             ('v', 'a view of the gallery'), ('k', 'a slice, from head to feet'),
             ('a_k', 'how much it counts: the more of it shows, the more colourful it is'),
             ('u', 'a colour'),

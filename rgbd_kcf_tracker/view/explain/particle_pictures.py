@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.features.sampling import systematic_resample
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.thesis import rgbd_pf
 from rgbd_kcf_tracker.thesis.color_histogram import ColorHistogram, bhattacharyya_distance
 from rgbd_kcf_tracker.thesis.particle_filter import (
     HEIGHT,
@@ -82,7 +83,7 @@ def _initial(first: Moment) -> Picture:
         '5.1', 'particles_first', 'Particles at the start',
         f'{len(states)} particles, each a guess at place, velocity, size and growth of the '
         'target, all of equal weight; a dot is the middle of one guess. They start about the given '
-        'box, and anywhere in the image once the target is lost.',
+        'box, and start there again wherever a hidden target is found.',
         r's = \{x, y, \dot{x}, \dot{y}, H_x, H_y, \alpha\}',
         (name_of(ParticleFilter.initialise),), plot_style.png(figure),
         {'states': states, 'box': box.as_tuple()},
@@ -144,7 +145,11 @@ def _steps(asked: Moment) -> Picture:
         signs(
             ('w_i', 'the weight of particle i; all together are 1'),
             (r'\propto', 'but for a factor, which makes them so'),
-            ('d_i', 'how unlike the colours in its box are to the target\'s: see the next picture'),
+            (
+                'd_i',
+                "how unlike the colours in its box are to the target's (see the next picture), at "
+                f'most {rgbd_pf._UNLIKE:g}',
+            ),
             (r'\sigma', f'{RgbdPfParameters().color_sigma:g}: how fast weight falls off with that'),
             ('s_i', 'the particle'), ('s_E', 'the estimate: the weighted mean'),
         ),
@@ -180,7 +185,7 @@ def _histogram(moments: ParticleMoments) -> Picture:
         shown.append((f'least alike particle, d = {d[farthest]:.2f}', every[0].value[farthest]))
         values |= {'distance': d, 'histograms': every[0].value}
         words = (
-            ' Beside it a particle whose box shows nearly the same colours, and one that does not: '
+            ' Beside it the particle whose box is the most alike in colours, and the least alike: '
             f'the distances are {d[nearest]:.2f} and {d[farthest]:.2f}.'
         )
     figure = plot_style.figure(9.5, 3.2)

@@ -115,8 +115,10 @@ def show_heat(
     bar.ax.tick_params(labelsize=7)
     axes.set_title(title, fontsize=9)
     axes.tick_params(labelsize=7)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(6, integer=True))
+    width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+    # The labels of a narrow picture would run into each other.
+    for axis, most in ((axes.xaxis, 3 if width < height / 2 else 6), (axes.yaxis, 6)):
+        axis.set_major_locator(MaxNLocator(most, integer=True))
 
 
 def show_mesh(
