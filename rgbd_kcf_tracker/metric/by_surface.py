@@ -183,11 +183,12 @@ class BySurface:
         missing = self._should_be_seen(scene) > 0.6
         others = account.others(self._person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
-        found += [
+        figures = [
             sight.figure.seen
             for sight in account.sights
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
+        found += [seen for seen in figures if not any(seen.same(other) for other in found)]
         free = [s for s in found if others[s.rows, s.cols][s.mask].mean() < STANDING]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
         self.candidates = [

@@ -167,7 +167,7 @@ class Account:
     def look(self, seen: Silhouette) -> View:
         """The look of any silhouette of the frame."""
         for sight in self.sights:
-            if sight.figure.seen is seen:
+            if sight.figure.seen is seen or sight.figure.seen.same(seen):
                 return sight.view
         top = None if seen.cut.top else self.scene.highest(seen)
         return View.of(self.scene.view, self.scene.codes, seen, top)

@@ -109,6 +109,15 @@ class Silhouette:
             or self.rows.stop >= rows - 1 - rim.bottom
         )
 
+    def same(self, other: Silhouette) -> bool:
+        """Whether another silhouette of the same view has the same pixels."""
+        return (
+            self.left == other.left
+            and self.top == other.top
+            and self.mask.shape == other.mask.shape
+            and bool(np.array_equal(self.mask, other.mask))
+        )
+
     @property
     def rows(self) -> slice:
         """Rows of the view that the crop covers."""
