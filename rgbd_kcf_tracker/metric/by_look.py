@@ -27,8 +27,6 @@ LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window."""
 UNSURE = 0.7
 BETTER = 0.25
-ROUNDS = 3
-"""Times that the size is looked for after a large step, which may exceed the filter's range."""
 SCALE_RATE = 0.025
 SCALE_TIME = 0.1
 SCALE_RANGE = (0.1, 10.0)
@@ -212,11 +210,7 @@ class ByLook:
             wanted = np.log(self._first_depth / self._depth * self._zoom / self._scale)
             self._scale *= float(np.exp(np.clip(wanted, -0.3, 0.3) * min(1, dt / SCALE_TIME)))
         else:
-            for _ in range(ROUNDS if dt > LARGE_STEP else 1):
-                factor = self._scales.factor(frame.color, self._cx, self._cy, *self._size)
-                self._scale *= factor
-                if factor == 1.0:
-                    break
+            self._scale *= self._scales.factor(frame.color, self._cx, self._cy, *self._size)
         self._scale = float(np.clip(self._scale, *SCALE_RANGE))
 
 
