@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -157,6 +158,19 @@ class Rig:
             before = len(self.boxes)
             self.send(index, **header)
             self.wait(lambda before=before: len(self.boxes) > before, what=f'box of frame {index}')
+
+    def play_until_heard(self, index: int) -> None:
+        """A frame, again and again until it is answered.
+
+        Publishers that were made a moment ago may see a subscription that does not see them yet
+        (discovery is one-sided), and a message that is sent into that gap is for nobody.
+        """
+        for _ in range(12):
+            self.send(index)
+            with contextlib.suppress(AssertionError):
+                self.wait(lambda: len(self.boxes) > 0, timeout=5.0)
+                return
+        raise AssertionError(f'frame {index} is not answered, however often it is sent')
 
     def send_init(self, box: Box) -> None:
         x, y, width, height = (round(v) for v in box.as_tuple())
