@@ -9,20 +9,16 @@ Needs opennav_following and nav2_lifecycle_manager, a robot that takes cmd_vel a
 and TF from the camera to odom. Arguments that are not here are those of tracker.launch.py.
 """
 
-from pathlib import Path
-
-from ament_index_python.packages import get_package_share_directory
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import IncludeLaunchDescription, OpaqueFunction
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
+from rgbd_kcf_tracker.ros.launching import CONFIG, declared, given, is_true
 
-SHARE = Path(get_package_share_directory('rgbd_kcf_tracker'))
 ARGUMENTS = {
     'follow_file': (
-        str(SHARE / 'config' / 'follow.yaml'),
+        str(CONFIG / 'follow.yaml'),
         'Parameters of the Following Server and of the node that asks it.',
     ),
     'cmd_vel': ('cmd_vel', 'Topic of the velocities that the Following Server sends.'),
@@ -32,19 +28,18 @@ ARGUMENTS = {
     'name': ('tracker', 'Name of the tracker node.'),
     'use_sim_time': ('false', 'Take the time from /clock.'),
 }
-YES = ('true', '1', 'yes', 'on')
 
 
 def start(context: LaunchContext) -> list:
     """The nodes, once the arguments are known."""
-    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
-    common = {'use_sim_time': given['use_sim_time'].strip().lower() in YES}
-    namespace, file = given['namespace'], given['follow_file']
+    values = given(ARGUMENTS, context)
+    common = {'use_sim_time': is_true(values['use_sim_time'])}
+    namespace, file = values['namespace'], values['follow_file']
     actions = [
         IncludeLaunchDescription(
-            PythonLaunchDescriptionSource(str(SHARE / 'launch' / 'tracker.launch.py')),
+            PythonLaunchDescriptionSource(str(CONFIG.parent / 'launch' / 'tracker.launch.py')),
             launch_arguments=[
-                (name, given[name]) for name in ('namespace', 'name', 'use_sim_time')
+                (name, values[name]) for name in ('namespace', 'name', 'use_sim_time')
             ],
         ),
         Node(
@@ -56,14 +51,14 @@ def start(context: LaunchContext) -> list:
                 file,
                 {
                     **common,
-                    'tracker': given['name'],
-                    'automatic': given['automatic'].strip().lower() in YES,
+                    'tracker': values['name'],
+                    'automatic': is_true(values['automatic']),
                 },
             ],
             output='screen',
         ),
     ]
-    if given['server'].strip().lower() in YES:
+    if is_true(values['server']):
         actions += [
             Node(
                 package='opennav_following',
@@ -71,7 +66,7 @@ def start(context: LaunchContext) -> list:
                 name='following_server',
                 namespace=namespace,
                 parameters=[file, common],
-                remappings=[('cmd_vel', given['cmd_vel'])],
+                remappings=[('cmd_vel', values['cmd_vel'])],
                 output='screen',
             ),
             Node(
@@ -88,8 +83,4 @@ def start(context: LaunchContext) -> list:
 
 def generate_launch_description() -> LaunchDescription:
     """The arguments and the nodes."""
-    declared = [
-        DeclareLaunchArgument(name, default_value=default, description=text)
-        for name, (default, text) in ARGUMENTS.items()
-    ]
-    return LaunchDescription([*declared, OpaqueFunction(function=start)])
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=start)])

@@ -12,8 +12,12 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from ros_rig import Rig
 
 # Field checks are off by default in Jazzy; without them a wrong type serialises garbage silently.
 # rclpy's generated messages read this when they are imported, so it is set before any of them is.
@@ -86,6 +90,16 @@ def _own_ros_domain(request: pytest.FixtureRequest) -> Iterator[None]:
     folder = request.getfixturevalue('tmp_path_factory').mktemp('ros_log')
     with ros_environment(folder):
         yield
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    """A camera, and a listener to what a tracker says (only for tests marked ``ros``)."""
+    from ros_rig import Rig  # needs ROS 2
+
+    made = Rig()
+    yield made
+    made.close()
 
 
 @pytest.fixture

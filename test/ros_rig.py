@@ -61,6 +61,11 @@ def scene(index: int) -> tuple[np.ndarray, np.ndarray, Box]:
     return color, depth, Box(x, y, 36, 60)
 
 
+def box_text(index: int = 0) -> str:
+    """The target in a frame of :func:`scene`, as the parameter ``init_box`` takes it."""
+    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
+
+
 def stamp_of(index: int) -> int:
     return START_NS + index * PERIOD_NS
 

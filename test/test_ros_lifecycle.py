@@ -10,7 +10,6 @@ import gc
 import os
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
-from ros_rig import Rig, overrides, running_node, scene, tracker_process
+from ros_rig import Rig, box_text, overrides, running_node, scene, tracker_process
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.generated import outdated
@@ -36,13 +35,6 @@ from rgbd_kcf_tracker.track import TrackState
 pytestmark = pytest.mark.ros
 
 PROJECT = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    made = Rig()
-    yield made
-    made.close()
 
 
 def call(rig: Rig, kind: Any, name: str, request: Any) -> Any:
@@ -74,10 +66,6 @@ def set_parameter(rig: Rig, name: str, value: Any) -> Any:
     parameter = Parameter(name, value=value).to_parameter_msg()
     request = SetParameters.Request(parameters=[parameter])
     return call(rig, SetParameters, '/tracker/set_parameters', request).results[0]
-
-
-def box_text(index: int) -> str:
-    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
 
 
 def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType, SimpleNamespace
@@ -25,7 +24,7 @@ from geometry_msgs.msg import (
     TwistWithCovarianceStamped,
 )
 from rclpy.lifecycle import LifecycleNode
-from ros_rig import Rig, running_node, scene, tracker_process
+from ros_rig import Rig, box_text, running_node, scene, tracker_process
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, CompressedImage, RegionOfInterest
 from stand_ins import foxglove_messages, vision_messages
@@ -39,17 +38,6 @@ from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_sta
 from rgbd_kcf_tracker.ros.messages import RosTypes, stamp_to_ns
 
 pytestmark = pytest.mark.ros
-
-
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    made = Rig()
-    yield made
-    made.close()
-
-
-def box_text(index: int = 0) -> str:
-    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
 
 
 def listen(rig: Rig, kind: Any, topic: str) -> list[Any]:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from itertools import islice
 
 import cv2
@@ -16,7 +15,7 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from geometry_msgs.msg import Point, PointStamped
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from ros_rig import FOCAL, Rig, running_node, scene, stamp_of, tracker_process
+from ros_rig import FOCAL, Rig, box_text, running_node, scene, stamp_of, tracker_process
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from visualization_msgs.msg import Marker
@@ -27,17 +26,6 @@ from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.variants import VARIANTS
 
 pytestmark = pytest.mark.ros
-
-
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    made = Rig()
-    yield made
-    made.close()
-
-
-def box_text(index: int = 0) -> str:
-    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
 
 
 def test_a_click_chooses_the_surface(rig: Rig) -> None:

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -39,13 +38,6 @@ from rgbd_kcf_tracker.variants import VARIANTS
 pytestmark = pytest.mark.ros
 
 INTRINSICS = Intrinsics(FOCAL, FOCAL, 159.5, 119.5)
-
-
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    made = Rig()
-    yield made
-    made.close()
 
 
 def offline(variant: str, count: int) -> list[Box | None]:

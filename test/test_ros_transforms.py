@@ -25,7 +25,7 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
-from ros_rig import FRAME_ID, PERIOD_NS, START_NS, Rig, running_node, scene, stamp_of
+from ros_rig import FRAME_ID, PERIOD_NS, START_NS, Rig, box_text, running_node, scene, stamp_of
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, RegionOfInterest
 from stand_ins import tf2_ros
@@ -94,10 +94,6 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[Rig]:
     made = Rig()
     yield made
     made.close()
-
-
-def box_text(index: int = 0) -> str:
-    return ','.join(f'{v:g}' for v in scene(index)[2].as_tuple())
 
 
 def settled(rig: Rig, node: Any, frame: str, stamp_ns: int = 0) -> None:

@@ -105,13 +105,6 @@ def until(rig: Rig, condition: Callable[[], Any], seconds: float = 60) -> None:
         time.sleep(0.03)
 
 
-@pytest.fixture
-def rig() -> Iterator[Rig]:
-    made = Rig()
-    yield made
-    made.close()
-
-
 def test_a_box_from_the_page_starts_the_tracker_and_is_shown(rig: Rig) -> None:
     with running_node(rig), running_viewer() as (node, server):
         assert rig.color.get_subscription_count() == 1  # nobody looks: the images are not asked for
