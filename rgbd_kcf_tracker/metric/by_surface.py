@@ -125,16 +125,16 @@ class BySurface:
         iou[0] = 0
         # A wall behind may fill the box as well: it must be the surface that the box shows.
         inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
-        iou *= np.bincount(inside.ravel(), minlength=len(scene.surfaces)) > 0
+        pixels = np.bincount(inside.ravel(), minlength=len(scene.surfaces))
+        iou *= pixels > 0
         label = int(np.argmax(iou))
         if iou[label] >= LOCK_IOU:
             return BySurface._within(scene, scene.silhouette(label), box)
         # Two who touch are one surface: the part of it that the box shows is the target.
-        pixels = np.bincount(inside.ravel(), minlength=len(scene.surfaces))
         pixels[0] = 0
         label = int(np.argmax(pixels))
         large = scene.surfaces.pixels[label] > MOST_SHARE * inside.size
-        if large or iou[label] == 0 or pixels[label] < LEAST_FILL * inside.size:
+        if large or pixels[label] < LEAST_FILL * inside.size:
             return None
         part = BySurface._within(scene, scene.silhouette(label), box)
         return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None

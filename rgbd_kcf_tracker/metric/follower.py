@@ -246,7 +246,7 @@ class Follower:
 
     def _taken(self, account: Account, box: Box) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""
-        index = _shown(account, box)
+        index = account.sight_among(account.which[_part(account, box)].ravel())
         if index < 0 or account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
@@ -330,16 +330,6 @@ def _part(account: Account, box: Box) -> tuple[slice, slice]:
     x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
     y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
     return slice(y0, y1), slice(x0, x1)
-
-
-def _shown(account: Account, box: Box) -> int:
-    """Index of the sight that fills most of the middle of a box, -1 for none."""
-    part = account.which[_part(account, box)]
-    if not part.size or not account.sights:
-        return -1
-    counts = np.bincount(part.ravel(), minlength=len(account.sights) + 1)
-    best = int(np.argmax(counts[1:]))
-    return best if counts[best + 1] > 0.5 * part.size else -1
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:

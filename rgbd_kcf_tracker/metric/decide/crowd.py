@@ -150,9 +150,12 @@ class Account:
 
     def sight_of(self, seen: Silhouette) -> int:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
+        return self.sight_among(self.which[seen.rows, seen.cols][seen.mask])
+
+    def sight_among(self, pixels: npt.NDArray[np.int16]) -> int:
+        """Index of the sight that most of some pixels of :attr:`which` show, -1 for none."""
         if not self.sights:
             return -1
-        pixels = self.which[seen.rows, seen.cols][seen.mask]
         counts = np.bincount(pixels, minlength=len(self.sights) + 1)
         best = int(np.argmax(counts[1:]))
         return best if counts[best + 1] > MOST * len(pixels) else -1
@@ -167,9 +170,9 @@ class Account:
     def look(self, seen: Silhouette) -> View:
         """The look of any silhouette of the frame."""
         for sight in self.sights:
-            if sight.figure.seen is seen or sight.figure.seen.same(seen):
+            if sight.figure.seen.same(seen):
                 return sight.view
-        top = None if seen.cut.top else self.scene.highest(seen)
+        top = None if seen.cut.top else seen.highest(self.scene.elevation)
         return View.of(self.scene.view, self.scene.codes, seen, top)
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
@@ -319,8 +322,10 @@ class Crowd:
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
         # borne out over some sightings who he is.
         away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
-        open_odds = np.where(np.array(away)[:, None], NEW - 1, odds) if any(away) else odds
-        account.owner = _assigned(open_odds, len(sights)) if any(away) else list(account.verdict)
+        account.owner = list(account.verdict)
+        if any(away):
+            odds_of_here = np.where(np.array(away)[:, None], NEW - 1, odds)
+            account.owner = _assigned(odds_of_here, len(sights))
         for column, row in enumerate(account.owner):
             if row >= 0:
                 self._compare(account, row, column)
@@ -333,8 +338,11 @@ class Crowd:
         for other, person in enumerate(account.people[: len(account.looks)]):
             if other == row or person.number in newcomer.met:
                 continue
-            gone = person.seen_at < newcomer.first_seen
-            if account.time - person.seen_at > REUNION if person.chosen else gone:
+            if person.chosen:
+                away = account.time - person.seen_at > REUNION
+            else:
+                away = person.seen_at < newcomer.first_seen
+            if away:
                 newcomer.resembled(person.number, float(account.looks[other, column]), shows)
 
     def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
@@ -399,15 +407,15 @@ class Crowd:
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
         self._introduce(account, targets)
-        self._reunite(account, targets)
+        self._reunite(account)
 
-    def _reunite(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+    def _reunite(self, account: Account) -> None:
         """Give newcomers the number of whom they have turned out to be.
 
         A first sight alone seldom tells; what several say together does.
         """
         for column, row in enumerate(account.owner):
-            if row < 0 or account.people[row].chosen or account.people[row].number in targets:
+            if row < 0 or account.people[row].chosen:
                 continue
             newcomer = account.people[row]
             alike = [
@@ -417,14 +425,13 @@ class Crowd:
                 and (person.chosen or person.seen_at < newcomer.first_seen)
             ]
             alike.sort(reverse=True)
-            if not alike or alike[0][0] < RETURN + SAME_AGAIN:
+            (odds, index), *others = alike or [(0.0, -1)]
+            if odds < RETURN + SAME_AGAIN or (others and others[0][0] > odds - SAME_AGAIN):
                 continue
-            if account.people[alike[0][1]].chosen:
+            if account.people[index].chosen:  # who was chosen is recognised by who follows him
                 continue
-            if len(alike) > 1 and alike[1][0] > alike[0][0] - SAME_AGAIN:
-                continue
-            account.people[alike[0][1]].become(newcomer)
-            account.owner[column] = alike[0][1]
+            account.people[index].become(newcomer)
+            account.owner[column] = index
             if newcomer in self.people:
                 self.people.remove(newcomer)
 
@@ -479,7 +486,7 @@ class Crowd:
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted
-        headed = not seen.cut.top or (account.scene.highest(seen) or 0.0) > HEADED
+        headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
         whole = seen.area > WHOLE and headed and alone
         if whole or not person.gallery.views:
             person.gallery.learn(view)

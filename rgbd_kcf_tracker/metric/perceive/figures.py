@@ -262,7 +262,7 @@ def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figu
     cut_off = seen.cut.any
     if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
         return None
-    highest = scene.highest(seen)
+    highest = seen.highest(scene.elevation)
     if highest is not None and highest < LEAST_TOP:
         return None
     left_end, _, right_end, _ = seen.metres

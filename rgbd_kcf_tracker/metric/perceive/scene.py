@@ -68,12 +68,6 @@ class Scene:
         mask = self.surfaces.labels[top : top + height, left : left + width] == label
         return Silhouette.of(self.view, left, top, mask, label, self.rim)
 
-    def highest(self, seen: Silhouette) -> float | None:
-        """Metres above the floor of a silhouette's upper end, None where no floor is known."""
-        if self.elevation is None:
-            return None
-        return float(np.percentile(self.elevation[seen.rows, seen.cols][seen.mask], 98))
-
 
 class SceneReader:
     """Reads frames of one stream; what does not change between them is remembered.

@@ -109,9 +109,19 @@ class Silhouette:
             or self.rows.stop >= rows - 1 - rim.bottom
         )
 
+    def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
+        """Metres above the floor of the upper end, None where no floor is known.
+
+        Args:
+            elevation: ``(h, w)`` of the view, metres, or None.
+        """
+        if elevation is None:
+            return None
+        return float(np.percentile(elevation[self.rows, self.cols][self.mask], 98))
+
     def same(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view has the same pixels."""
-        return (
+        return self is other or (
             self.left == other.left
             and self.top == other.top
             and self.mask.shape == other.mask.shape

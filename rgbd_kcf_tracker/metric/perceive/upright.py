@@ -112,9 +112,6 @@ def upright_people(
         left, upper, width, height = (int(v) for v in surfaces.boxes[label])
         mask = surfaces.labels[upper : upper + height, left : left + width] == label
         seen = Silhouette.of(view, left, upper, mask, int(label), rim)
-        top = None
-        if elevation is not None:
-            top = float(np.percentile(elevation[seen.rows, seen.cols][seen.mask], 98))
-        member[label] = upright(seen, k, top)
+        member[label] = upright(seen, k, seen.highest(elevation))
     people: npt.NDArray[np.bool_] = member[surfaces.labels]
     return people
