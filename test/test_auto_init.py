@@ -96,3 +96,18 @@ def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool) 
     view = DepthView(depth, 1, Intrinsics.guess(160, 120))
     seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
     assert rounded(view, seen) is round_
+
+
+@pytest.mark.parametrize(
+    ('given', 'said'),
+    [
+        (['--seeds', 'abc'], 'give numbers like'),
+        (['--seeds', '', '--people', '/nowhere'], '/nowhere does not exist'),
+        (['--intrinsics', '1,2'], 'FX,FY,CX,CY'),
+    ],
+)
+def test_wrong_arguments_of_the_measurement_are_answered_in_a_sentence(
+    given: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bench.main(given) == 2
+    assert said in capsys.readouterr().err

@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, with_intrinsics
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
-from rgbd_kcf_tracker.evaluation.table import Table
+from rgbd_kcf_tracker.evaluation.table import Cell, Table
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.live.auto_init import AutoInit
@@ -92,7 +92,7 @@ class Tally:
             total = getattr(self, field.name) + getattr(other, field.name)
             setattr(self, field.name, total)
 
-    def row(self, name: str) -> tuple[str | float | int | None, ...]:
+    def row(self, name: str) -> tuple[Cell, ...]:
         """A row of the table."""
         return (
             name,
@@ -251,6 +251,36 @@ def recorded(text: str, fps: float, camera: Intrinsics | None, empty: bool) -> I
 # --- the command -------------------------------------------------------------------------------
 
 
+def measured(args: argparse.Namespace) -> tuple[Tally, list[tuple[Cell, ...]]]:
+    """What was chosen in all, and a row for each kind of scene."""
+    settings = NodeParameters(auto_init=True)
+    seeds = parse_seeds(args.seeds) if args.seeds else []
+    camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
+    kinds: dict[str, list[tuple[str, Iterator[Sample]]]] = {}
+    for kind, scenarios in (
+        ('people', PEOPLE), ('empty', EMPTY), ('things', THINGS), ('pictures', PICTURES)
+    ):  # fmt: skip
+        kinds[kind] = [
+            (f'{scenario}/{seed}', rendered(scenario, seed, kind))
+            for scenario in scenarios
+            for seed in seeds
+        ]
+    kinds['recorded people'] = [(f, recorded(f, args.fps, camera, False)) for f in args.people]
+    kinds['recorded, empty'] = [(f, recorded(f, args.fps, camera, True)) for f in args.empty]
+    total, rows = Tally(), []
+    for kind, scenes in kinds.items():
+        tally = Tally()
+        for name, samples in scenes:
+            one = judge(samples, settings)
+            tally.add(one)
+            if one.wrong:
+                print(f'{kind} {name}: {one.wrong} of {one.choices} wrong', file=sys.stderr)
+        if scenes:
+            rows.append(tally.row(kind))
+        total.add(tally)
+    return total, rows
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure and print a table; status 1 where a choice in fifty or more was wrong."""
     parser = argparse.ArgumentParser(
@@ -268,32 +298,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--fps', type=float, default=5.0, help='of the recordings')
     parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help="the recordings' camera")
     args = parser.parse_args(argv)
-    settings = NodeParameters(auto_init=True)
-    seeds = parse_seeds(args.seeds) if args.seeds else []
-    camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
-    kinds: dict[str, list[tuple[str, Iterator[Sample]]]] = {}
-    for kind, scenarios in (
-        ('people', PEOPLE), ('empty', EMPTY), ('things', THINGS), ('pictures', PICTURES)
-    ):  # fmt: skip
-        kinds[kind] = [
-            (f'{scenario}/{seed}', rendered(scenario, seed, kind))
-            for scenario in scenarios
-            for seed in seeds
-        ]
-    kinds['recorded people'] = [(f, recorded(f, args.fps, camera, False)) for f in args.people]
-    kinds['recorded, empty'] = [(f, recorded(f, args.fps, camera, True)) for f in args.empty]
-    total, rows = Tally(), []
     try:
-        for kind, scenes in kinds.items():
-            tally = Tally()
-            for name, samples in scenes:
-                one = judge(samples, settings)
-                tally.add(one)
-                if one.wrong:
-                    print(f'{kind} {name}: {one.wrong} of {one.choices} wrong', file=sys.stderr)
-            if scenes:
-                rows.append(tally.row(kind))
-            total.add(tally)
+        total, rows = measured(args)
     except RgbdKcfError as error:
         print(error, file=sys.stderr)
         return 2
