@@ -10,6 +10,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -67,8 +68,11 @@ def assert_share_is_complete(share: Path) -> None:
 
 def test_pip_install(source: Path, tmp_path: Path) -> None:
     prefix = tmp_path / 'prefix'
+    environment_before = sorted(Path(sysconfig.get_path('purelib')).iterdir())
     run(sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-build-isolation',
-        '--prefix', prefix, source, cwd=tmp_path)  # fmt: skip
+        '--ignore-installed', '--prefix', prefix, source, cwd=tmp_path)  # fmt: skip
+    # Else pip takes the package that this suite runs from out of its environment.
+    assert sorted(Path(sysconfig.get_path('purelib')).iterdir()) == environment_before
     version = f'python{sys.version_info.major}.{sys.version_info.minor}'
     packages = prefix / 'lib' / version / 'site-packages'
     assert (packages / NAME / 'py.typed').is_file()
