@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,8 @@ STANDING = 0.5
 which it is not the target."""
 SOMEBODY_ELSE = 3.0
 """Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
+APART = 0.5
+"""Distance between two candidates, in widths of the body, from which they are not parts of one."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
 
@@ -207,13 +210,31 @@ class BySurface:
                 if candidate is self.candidates[0]:
                     self.candidates.insert(0, self.candidates.pop())
                     break
-        best = self.candidates[0] if self.candidates else None
+        best = self._alone(self.candidates) if self.candidates else None
         parameters = self._parameters
         if best is None or best.probability < (
             parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
         ):
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
+
+    def _alone(self, candidates: list[Candidate]) -> Candidate:
+        """The best candidate with its probability beside all others: the target is one of them."""
+        best = candidates[0]
+        apart = APART * self.body.width
+        rivals: list[Candidate] = []
+        for other in candidates[1:]:
+            if all(
+                np.hypot(*(other.placed.position - each.placed.position)[[0, 2]]) > apart
+                and not other.seen.meets(each.seen)
+                for each in (best, *rivals)
+            ):
+                rivals.append(other)
+        if not rivals:
+            return best
+        mine = best.probability / (1 - best.probability)
+        theirs = sum(each.probability / (1 - each.probability) for each in rivals)
+        return dataclasses.replace(best, probability=mine / (1 + mine + theirs))
 
     def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""

@@ -128,6 +128,16 @@ class Silhouette:
             and bool(np.array_equal(self.mask, other.mask))
         )
 
+    def meets(self, other: Silhouette) -> bool:
+        """Whether another silhouette of the same view shares a pixel with it."""
+        y0, y1 = max(self.top, other.top), min(self.rows.stop, other.rows.stop)
+        x0, x1 = max(self.left, other.left), min(self.cols.stop, other.cols.stop)
+        if y0 >= y1 or x0 >= x1:
+            return False
+        mine = self.mask[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left]
+        theirs = other.mask[y0 - other.top : y1 - other.top, x0 - other.left : x1 - other.left]
+        return bool((mine & theirs).any())
+
     @property
     def rows(self) -> slice:
         """Rows of the view that the crop covers."""
