@@ -31,7 +31,7 @@ FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
-LEAST_FILL = 0.3
+LEAST_FILL = 0.5
 """Share of the given box that a surface fills of which the box shows only a part."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it."""
