@@ -46,6 +46,10 @@ NEWCOMER_AREA = 0.1
 """Square metres of him, at the least."""
 COVERED = 0.6
 """Share of a newcomer's outline that lies in the target's box, at the least."""
+READ = 0.5
+"""Share of a box's middle that has depth from which depth tells what is there."""
+OUTLINED = 0.5
+"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it."""
 NEW_SCORE = 0.8
 """Score of a box when the target has just been found to be a newcomer."""
 
@@ -216,7 +220,9 @@ class Follower:
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
-            if unlike or self._stands(account, look.box) or self._taken(account, look.box):
+            if unlike or any(
+                refused(account, look.box) for refused in (self._stands, self._taken, self._far)
+            ):
                 self._look.refuse()
                 look = None
         if look is not None:
@@ -251,6 +257,16 @@ class Follower:
             return False
         owner = account.people[account.owner[index]]
         return owner.first_seen < self._since and owner.number not in self._about
+
+    def _far(self, account: Account, box: Box) -> bool:
+        """Whether a box elsewhere than the target was is no figure, though depth tells of it."""
+        if not account.settled or box.intersection(self._last_box) > 0:
+            return False
+        depth = account.scene.view.depth[_part(account, box)]
+        if np.count_nonzero(depth) < READ * depth.size:
+            return False
+        outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
+        return all(outline.iou(box) < OUTLINED for outline in outlines)
 
     def _agree(self, account: Account, look: Look | None) -> bool:
         """Go over to the surface once one has borne out the look, or somebody new is there."""
