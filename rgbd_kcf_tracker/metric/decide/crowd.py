@@ -325,6 +325,11 @@ class Crowd:
         account.owner = list(account.verdict)
         if any(away):
             odds_of_here = np.where(np.array(away)[:, None], NEW - 1, odds)
+            for column, row in enumerate(account.verdict):
+                if row >= 0 and away[row]:
+                    # Nor is that sight anybody's who was seen beside him.
+                    met = [person.number in self.people[row].met for person in self.people]
+                    odds_of_here[met, column] = NEW - 1
             account.owner = _assigned(odds_of_here, len(sights))
         for column, row in enumerate(account.owner):
             if row >= 0:
