@@ -33,6 +33,8 @@ from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
 
+SURE = 0.6
+"""Score from which a target's look is learned from where it was found."""
 SHORTEST_STEP = 1e-3
 LONGEST_STEP = 5.0
 """Seconds between two frames; stamps that stand still or jump are taken as these."""
@@ -157,7 +159,12 @@ class MetricTargets:
         targets = {
             f.person.number: f.seen for f in self._followers.values() if f.person is not None
         }
-        self._crowd.learn(self.account, targets)
+        unsure = {
+            f.person.number
+            for f in self._followers.values()
+            if f.person is not None and f.track.score < SURE
+        }
+        self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()
 
     def _name(self, person: Person | None) -> int:

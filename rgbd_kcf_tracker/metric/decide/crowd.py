@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -373,13 +374,20 @@ class Crowd:
         odds += looks
         return odds, looks
 
-    def learn(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
+    def learn(
+        self,
+        account: Account,
+        targets: dict[int, Silhouette | None],
+        unsure: Collection[int] = (),
+    ) -> None:
         """Take what was seen.
 
         Args:
             account: of the frame.
             targets: where those who are followed by other means were found, by their numbers; None
                 where they were not: nobody else's sight of them counts.
+            unsure: numbers of those of them who may be somebody else this time: nothing but the
+                place is learned from that.
         """
         people, time = account.people, account.time
         for row, person in enumerate(people):
@@ -395,7 +403,7 @@ class Crowd:
             if index >= 0:
                 self._merge(account, row, account.owner[index])
                 account.owner[index] = row
-            self._see(account, row, seen, index)
+            self._see(account, row, seen, index, person.number not in unsure)
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
             if row == HELD:
@@ -411,7 +419,7 @@ class Crowd:
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
-        self._introduce(account, targets)
+        self._introduce(account, {n: None if n in unsure else s for n, s in targets.items()})
         self._reunite(account)
 
     def _reunite(self, account: Account) -> None:
@@ -468,13 +476,17 @@ class Crowd:
         if double in self.people:
             self.people.remove(double)
 
-    def _see(self, account: Account, row: int, seen: Silhouette, index: int) -> None:
+    def _see(
+        self, account: Account, row: int, seen: Silhouette, index: int, sure: bool = True
+    ) -> None:
         """Take one sighting of one person."""
         person, scene = account.people[row], account.scene
         place = account.place(seen)
         if account.time > person.seen_at:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0
+        if not sure:
+            return
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
         if account.settled and seen.area > WHOLE:
