@@ -433,9 +433,12 @@ class BySurface:
         x1 = int(np.clip(right + wide, x0 + 1, cols))
         y0 = int(np.clip(top, 0, rows - 2))
         y1 = int(np.clip(bottom, y0 + 1, rows))
-        other = scene.view.depth > 0
-        other[seen.rows, seen.cols] &= ~seen.mask
-        other = other[y0:y1, x0:x1]
+        first, start = min(y0, seen.top), min(x0, seen.left)
+        other = scene.view.depth[first : max(y1, seen.rows.stop), start : max(x1, seen.cols.stop)] > 0
+        height, width = seen.mask.shape
+        v, u = seen.top - first, seen.left - start
+        other[v : v + height, u : u + width] &= ~seen.mask
+        other = other[y0 - first : y1 - first, x0 - start : x1 - start]
         self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:

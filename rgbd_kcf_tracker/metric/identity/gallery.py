@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import cv2
 import numpy as np
@@ -237,17 +238,19 @@ HEIGHT_MEMORY = 25
 
 
 class Gallery:
-    """The views by which one is known, and the height of the head."""
+    """The views by which one is known, and the height of the head.
+
+    Attributes:
+        views: the first and the newest.
+        looks: the same stacked, None while there is none.
+        top: median height of the head above the floor in metres, None where it is not known.
+    """
 
     def __init__(self) -> None:
         self.views: list[View] = []
         self.looks: Looks | None = None
+        self.top: float | None = None
         self._tops: list[float] = []
-
-    @property
-    def top(self) -> float | None:
-        """Median height of the head above the floor in metres, None where it is not known."""
-        return float(np.median(self._tops)) if self._tops else None
 
     def log_odds(self, view: View, alike: float | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
@@ -267,6 +270,7 @@ class Gallery:
     def learn_height(self, top: float) -> None:
         """Take a height of the head above the floor, in metres."""
         self._tops = [*self._tops[1 - HEIGHT_MEMORY :], top]
+        self.top = float(median(self._tops))
 
     def learn(self, view: View) -> None:
         """Take a view that is surely of this person, where it shows something new."""

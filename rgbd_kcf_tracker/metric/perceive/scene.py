@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -54,6 +54,7 @@ class Scene:
     rim: Rim
     codes: npt.NDArray[np.int32]
     motion: Pose | Lost | None
+    _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
     @property
     def ahead(self) -> npt.NDArray[np.float64]:
@@ -63,10 +64,14 @@ class Scene:
         return self.floor.ahead(self.view.intrinsics)
 
     def silhouette(self, label: int) -> Silhouette:
-        """One surface as a silhouette."""
-        left, top, width, height = (int(v) for v in self.surfaces.boxes[label])
-        mask = self.surfaces.labels[top : top + height, left : left + width] == label
-        return Silhouette.of(self.view, left, top, mask, label, self.rim)
+        """One surface as a silhouette; the same for whoever asks."""
+        seen = self._silhouettes.get(label)
+        if seen is None:
+            left, top, width, height = self.surfaces.boxes[label].tolist()
+            mask = self.surfaces.labels[top : top + height, left : left + width] == label
+            seen = Silhouette.of(self.view, left, top, mask, label, self.rim)
+            self._silhouettes[label] = seen
+        return seen
 
 
 class SceneReader:
