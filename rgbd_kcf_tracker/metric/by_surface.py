@@ -192,7 +192,7 @@ class BySurface:
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
         found += [seen for seen in figures if not any(seen.same(other) for other in found)]
-        free = [s for s in found if others[s.rows, s.cols][s.mask].mean() < STANDING]
+        free = [s for s in found if others.share(s) < STANDING]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
         self.candidates = [
             c
@@ -434,7 +434,9 @@ class BySurface:
         y0 = int(np.clip(top, 0, rows - 2))
         y1 = int(np.clip(bottom, y0 + 1, rows))
         first, start = min(y0, seen.top), min(x0, seen.left)
-        other = scene.view.depth[first : max(y1, seen.rows.stop), start : max(x1, seen.cols.stop)] > 0
+        other = (
+            scene.view.depth[first : max(y1, seen.rows.stop), start : max(x1, seen.cols.stop)] > 0
+        )
         height, width = seen.mask.shape
         v, u = seen.top - first, seen.left - start
         other[v : v + height, u : u + width] &= ~seen.mask

@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Counts, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -96,7 +98,7 @@ class Claim:
     room: float
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Account:
     """How a frame is explained.
 
@@ -121,17 +123,11 @@ class Account:
     settled: bool
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
-    _which: npt.NDArray[np.int16] | None = None
 
-    @property
-    def which(self) -> npt.NDArray[np.int16]:
-        """For each pixel the number of its sight from 1, or 0, ``(h, w)``."""
-        if self._which is None:
-            self._which = np.zeros(self.scene.view.shape, np.int16)
-            for number, sight in enumerate(self.sights, 1):
-                seen = sight.figure.seen
-                self._which[seen.rows, seen.cols][seen.mask] = number
-        return self._which
+    @cached_property
+    def parts(self) -> Parts:
+        """Which of the sights, or the room, each pixel shows."""
+        return Parts(self.scene, [sight.figure.seen for sight in self.sights])
 
     def place(self, seen: Silhouette) -> FloatArray:
         """Where a silhouette is, ``(2,)`` metres across and along the floor."""
@@ -150,15 +146,18 @@ class Account:
 
     def sight_of(self, seen: Silhouette) -> int:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
-        return self.sight_among(self.which[seen.rows, seen.cols][seen.mask])
+        return self.sight_among(self.parts.counts(seen))
 
-    def sight_among(self, pixels: npt.NDArray[np.int16]) -> int:
-        """Index of the sight that most of some pixels of :attr:`which` show, -1 for none."""
+    def sight_among(self, counts: Counts) -> int:
+        """Index of the sight that most of some pixels belong to, -1 for none.
+
+        Args:
+            counts: of the pixels, see :meth:`Parts.counted`.
+        """
         if not self.sights:
             return -1
-        counts = np.bincount(pixels, minlength=len(self.sights) + 1)
-        best = int(np.argmax(counts[1:]))
-        return best if counts[best + 1] > MOST * len(pixels) else -1
+        best = int(np.argmax(counts[FIRST:]))
+        return best if counts[FIRST + best] > MOST * counts.sum() else -1
 
     def figure_of(self, seen: Silhouette) -> int:
         """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
@@ -204,7 +203,8 @@ class Account:
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
-        return float(self.scene.still[seen.rows, seen.cols][seen.mask].mean())
+        counts = self.parts.counts(seen)
+        return int(counts[ROOM]) / int(counts.sum())
 
     def _room_beside(self, person: Person, seen: Silhouette) -> float:
         """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
@@ -224,22 +224,16 @@ class Account:
         mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
         return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
 
-    def others(self, person: Person) -> npt.NDArray[np.bool_]:
-        """The pixels that are surely not a person's, ``(h, w)`` bool.
+    def others(self, person: Person) -> Others:
+        """The pixels that are surely not a person's.
 
         They belong to somebody who was seen beside him, or are the room where he is no part of it.
         """
-        theirs = np.zeros(len(self.sights) + 1, np.bool_)
-        theirs[0] = person.mobile
-        for number, owner in enumerate(self.owner, 1):
-            met = owner >= 0 and self.people[owner].number in person.met
-            theirs[number] = met and person.area >= SMALL
-        if not theirs.any():
-            return np.zeros(self.which.shape, np.bool_)
-        mask: npt.NDArray[np.bool_] = theirs[self.which]
-        if person.mobile:
-            mask &= self.scene.still | (self.which != 0)
-        return mask
+        met = [
+            owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
+            for owner in self.owner
+        ]
+        return Others(self.parts, np.array([False, person.mobile, *met]))
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.

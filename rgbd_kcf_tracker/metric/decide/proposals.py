@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 FloatArray = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 LEAST_PIXELS = 12
 LEAST_SHARE = 0.06
@@ -75,7 +75,7 @@ class Facts:
 
 
 def propose(
-    scene: Scene, body: Body, expected: Expectation, others: Mask, most: int
+    scene: Scene, body: Body, expected: Expectation, others: Others, most: int
 ) -> list[Silhouette]:
     """Surfaces within reach, as they are and cut to the target.
 
@@ -83,7 +83,7 @@ def propose(
         scene: of now.
         body: the target.
         expected: where it is expected.
-        others: ``(h, w)`` bool, pixels known not to be it.
+        others: pixels known not to be it.
         most: largest number of whole surfaces to propose, the nearest to ``expected`` first.
     """
     facts = Facts.of(scene)
@@ -109,7 +109,7 @@ def propose(
 
 
 def _split(
-    scene: Scene, body: Body, expected: Expectation, others: Mask, facts: Facts
+    scene: Scene, body: Body, expected: Expectation, others: Others, facts: Facts
 ) -> list[Silhouette]:
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
@@ -118,8 +118,7 @@ def _split(
     if z < 0.2:
         return []
     large = facts.area > TOO_LARGE * body.area
-    if others.any():
-        large |= (_shares(scene, others) > MIXED) & (facts.area > body.area)
+    large |= (others.of_surfaces > MIXED) & (facts.area > body.area)
     large[0] = False
     if not large.any():
         return []
@@ -135,7 +134,7 @@ def _split(
     depth = view.depth[top:bottom, left:right]
     mask = large[scene.surfaces.labels[top:bottom, left:right]]
     mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
-    mask &= ~others[top:bottom, left:right]
+    mask &= ~others.within(slice(top, bottom), slice(left, right))
     if not mask.any():
         return []
     pieces = surfaces_in(
@@ -157,21 +156,20 @@ def _narrowed(
     body: Body,
     seen: Silhouette,
     expected: Expectation,
-    others: Mask,
+    others: Others,
 ) -> Silhouette | None:
     """The part of a too wide silhouette that most likely is the target, by colour and place."""
     k = scene.view.intrinsics
     wanted = body.width * 1.1
     if not body.width_known or seen.width < 1.3 * wanted:
         return None
-    known = others[seen.rows, seen.cols]
-    if seen.area < TOO_LARGE * body.area and known[seen.mask].mean() < MIXED:
+    if seen.area < TOO_LARGE * body.area and others.share(seen) < MIXED:
         return None
     cols = max(2, round(wanted * k.fx / seen.depth))
     codes = scene.codes[seen.rows, seen.cols]
     odds = body.odds_of(codes, seen, scene.view, float(expected.position[1]))
     odds[~seen.mask] = 0
-    odds -= np.float32(0.5) * known
+    odds -= np.float32(0.5) * others.within(seen.rows, seen.cols)
     profile = np.convolve(odds.sum(axis=0), np.ones(cols), 'valid')
     middle = seen.left + np.arange(len(profile)) + cols / 2
     x = (middle - k.cx) * seen.depth / k.fx
@@ -190,15 +188,8 @@ def _narrowed(
     )
 
 
-def _shares(scene: Scene, others: Mask) -> FloatArray:
-    """Share of each surface's pixels that are others', ``(n,)``."""
-    surfaces = scene.surfaces
-    total = np.bincount(surfaces.labels[others], minlength=len(surfaces))
-    return np.asarray(total / np.maximum(surfaces.pixels, 1))
-
-
 def gathered(
-    scene: Scene, body: Body, seen: Silhouette, placed: Placed, others: Mask
+    scene: Scene, body: Body, seen: Silhouette, placed: Placed, others: Others
 ) -> Silhouette | None:
     """A silhouette with the pieces that lie within the body that it belongs to.
 
@@ -225,8 +216,7 @@ def gathered(
     inside &= surfaces.pixels >= 3
     inside[0] = False
     inside[seen.label] = False
-    if inside.any() and others.any():
-        inside &= _shares(scene, others) < 0.5
+    inside &= others.of_surfaces < 0.5
     more = boxes[inside]
     if not len(more):
         return None

@@ -211,9 +211,7 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     # Between two surfaces there often is a seam without a reading.
     nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
 
-    def hidden(
-        to: tuple[slice, slice], of: tuple[slice, slice]
-    ) -> bool:
+    def hidden(to: tuple[slice, slice], of: tuple[slice, slice]) -> bool:
         """Along the side on which the pixels ``to`` lie beyond those ``of`` the body."""
         beyond = body[of] & ~body[to]
         total = int(np.count_nonzero(beyond))

@@ -1,0 +1,89 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whose each pixel of a frame is, counted once for all who are followed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+Counts = npt.NDArray[np.intp]
+
+NOTHING, ROOM, FIRST = 0, 1, 2
+"""Kinds of pixels: of nothing known, of the room, of the first of the figures and so on."""
+
+
+class Parts:
+    """What the pixels of a frame belong to: a figure, the room, or nothing known.
+
+    Args:
+        scene: of the frame.
+        figures: silhouettes that do not overlap.
+
+    Attributes:
+        kinds: ``(h, w)``, see :data:`FIRST`.
+    """
+
+    def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
+        self._surfaces = scene.surfaces
+        self.kinds: Counts = scene.still.astype(np.intp)
+        self.length = FIRST + len(figures)
+        for kind, seen in enumerate(figures, FIRST):
+            self.kinds[seen.rows, seen.cols][seen.mask] = kind
+        self._counts: dict[Silhouette, Counts] = {}
+
+    def counts(self, seen: Silhouette) -> Counts:
+        """How many of a silhouette's pixels are of each kind, ``(kinds,)``."""
+        counts = self._counts.get(seen)
+        if counts is None:
+            counts = self.counted(self.kinds[seen.rows, seen.cols][seen.mask])
+            self._counts[seen] = counts
+        return counts
+
+    def counted(self, kinds: Counts) -> Counts:
+        """How many of some pixels are of each kind, ``(kinds,)``."""
+        return np.bincount(kinds, minlength=self.length)
+
+    @cached_property
+    def of_surfaces(self) -> Counts:
+        """How many of each surface's pixels are of each kind, ``(n, kinds)``."""
+        count = len(self._surfaces)
+        both = self._surfaces.labels * self.length + self.kinds
+        return np.bincount(both.ravel(), minlength=count * self.length).reshape(count, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Others:
+    """The pixels that are surely not a person's.
+
+    Attributes:
+        parts: of the frame.
+        theirs: ``(kinds,)`` bool, the kinds of these pixels.
+    """
+
+    parts: Parts
+    theirs: npt.NDArray[np.bool_]
+
+    def within(self, rows: slice, cols: slice) -> npt.NDArray[np.bool_]:
+        """Those in a part of the view, bool."""
+        return self.theirs[self.parts.kinds[rows, cols]]
+
+    def share(self, seen: Silhouette) -> float:
+        """Share of a silhouette's pixels, 0 to 1."""
+        counts = self.parts.counts(seen)
+        return int(counts[self.theirs].sum()) / int(counts.sum())
+
+    @cached_property
+    def of_surfaces(self) -> npt.NDArray[np.float64]:
+        """Share of each surface's pixels, ``(n,)`` 0 to 1."""
+        counts = self.parts.of_surfaces
+        shares: npt.NDArray[np.float64] = (counts @ self.theirs) / np.maximum(counts.sum(axis=1), 1)
+        return shares
