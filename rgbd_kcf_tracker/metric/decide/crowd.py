@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Counts, Others, Parts
+from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -148,16 +148,14 @@ class Account:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
         return self.sight_among(self.parts.counts(seen))
 
-    def sight_among(self, counts: Counts) -> int:
+    def sight_among(self, counts: list[int]) -> int:
         """Index of the sight that most of some pixels belong to, -1 for none.
 
         Args:
             counts: of the pixels, see :meth:`Parts.counted`.
         """
-        if not self.sights:
-            return -1
-        best = int(np.argmax(counts[FIRST:]))
-        return best if counts[FIRST + best] > MOST * counts.sum() else -1
+        most = max(counts[FIRST:], default=0)
+        return counts.index(most, FIRST) - FIRST if most > MOST * sum(counts) else -1
 
     def figure_of(self, seen: Silhouette) -> int:
         """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
@@ -204,7 +202,7 @@ class Account:
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
         counts = self.parts.counts(seen)
-        return int(counts[ROOM]) / int(counts.sum())
+        return counts[ROOM] / sum(counts)
 
     def _room_beside(self, person: Person, seen: Silhouette) -> float:
         """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
@@ -233,7 +231,7 @@ class Account:
             owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
             for owner in self.owner
         ]
-        return Others(self.parts, np.array([False, person.mobile, *met]))
+        return Others(self.parts, [False, person.mobile, *met])
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.
@@ -466,17 +464,20 @@ class Crowd:
         person.last, person.figure = seen, index >= 0
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
-        if account.settled and seen.area > WHOLE:
+        if account.settled and not person.mobile and seen.area > WHOLE:
             before = account.scene.before[seen.rows, seen.cols][seen.mask]
-            person.mobile |= bool(before.mean() > 1 - PART_OF_ROOM)
+            person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
             others = np.delete(account.odds[:, index], row)
             rival = max(0.0, float(others.max())) if len(others) else 0.0
             if account.odds[row, index] - rival < SURE:
                 return
-        person.upright |= upright(seen, scene.view.intrinsics, view.top)
-        person.upright |= account.settled and person_sized(seen)
+        person.upright = (
+            person.upright
+            or (account.settled and person_sized(seen))
+            or upright(seen, scene.view.intrinsics, view.top)
+        )
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted

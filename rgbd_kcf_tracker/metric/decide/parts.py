@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
-Counts = npt.NDArray[np.intp]
+Kinds = npt.NDArray[np.intp]
 
 NOTHING, ROOM, FIRST = 0, 1, 2
 """Kinds of pixels: of nothing known, of the room, of the first of the figures and so on."""
@@ -34,26 +35,27 @@ class Parts:
 
     def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
         self._surfaces = scene.surfaces
-        self.kinds: Counts = scene.still.astype(np.intp)
+        self.kinds: Kinds = scene.still.astype(np.intp)
         self.length = FIRST + len(figures)
         for kind, seen in enumerate(figures, FIRST):
             self.kinds[seen.rows, seen.cols][seen.mask] = kind
-        self._counts: dict[Silhouette, Counts] = {}
+        self._counts: dict[Silhouette, list[int]] = {}
 
-    def counts(self, seen: Silhouette) -> Counts:
-        """How many of a silhouette's pixels are of each kind, ``(kinds,)``."""
+    def counts(self, seen: Silhouette) -> list[int]:
+        """How many of a silhouette's pixels are of each kind."""
         counts = self._counts.get(seen)
         if counts is None:
             counts = self.counted(self.kinds[seen.rows, seen.cols][seen.mask])
             self._counts[seen] = counts
         return counts
 
-    def counted(self, kinds: Counts) -> Counts:
-        """How many of some pixels are of each kind, ``(kinds,)``."""
-        return np.bincount(kinds, minlength=self.length)
+    def counted(self, kinds: Kinds) -> list[int]:
+        """How many of some pixels ``(n,)`` are of each kind."""
+        counts: list[int] = np.bincount(kinds, minlength=self.length).tolist()
+        return counts
 
     @cached_property
-    def of_surfaces(self) -> Counts:
+    def of_surfaces(self) -> Kinds:
         """How many of each surface's pixels are of each kind, ``(n, kinds)``."""
         count = len(self._surfaces)
         both = self._surfaces.labels * self.length + self.kinds
@@ -66,20 +68,20 @@ class Others:
 
     Attributes:
         parts: of the frame.
-        theirs: ``(kinds,)`` bool, the kinds of these pixels.
+        theirs: for each kind whether its pixels are of these.
     """
 
     parts: Parts
-    theirs: npt.NDArray[np.bool_]
+    theirs: list[bool]
 
     def within(self, rows: slice, cols: slice) -> npt.NDArray[np.bool_]:
         """Those in a part of the view, bool."""
-        return self.theirs[self.parts.kinds[rows, cols]]
+        return np.array(self.theirs)[self.parts.kinds[rows, cols]]
 
     def share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels, 0 to 1."""
         counts = self.parts.counts(seen)
-        return int(counts[self.theirs].sum()) / int(counts.sum())
+        return sum(compress(counts, self.theirs)) / sum(counts)
 
     @cached_property
     def of_surfaces(self) -> npt.NDArray[np.float64]:

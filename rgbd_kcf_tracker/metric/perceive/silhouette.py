@@ -22,6 +22,8 @@ RING = 2
 """Pixels of the view beyond the outline in which something nearer is looked for."""
 CUT_SHARE = 0.3
 """Share of one side's outline beside which something nearer must lie for that side to be cut."""
+UPPER = 0.98
+"""Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
 _SEAM = np.ones((3, 3), np.uint8)
 
 
@@ -118,7 +120,7 @@ class Silhouette:
         """
         if elevation is None:
             return None
-        return float(np.percentile(elevation[self.rows, self.cols][self.mask], 98))
+        return _upper_end(elevation[self.rows, self.cols][self.mask])
 
     def same(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view has the same pixels."""
@@ -193,6 +195,17 @@ class Silhouette:
         )
         area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
         return cls(left, top, mask, label, z, area, cut, metres)
+
+
+def _upper_end(values: npt.NDArray[np.float32]) -> float:
+    """The 98th percentile of ``(n,)``: ``np.percentile`` takes five times as long."""
+    place = UPPER * (len(values) - 1)
+    low = int(place)
+    high = min(low + 1, len(values) - 1)
+    ordered = np.partition(values, (low, high))
+    share = place - low
+    step = ordered[high] - ordered[low]
+    return float(ordered[low] + step * share if share < 0.5 else ordered[high] - step * (1 - share))
 
 
 def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) -> Sides:
