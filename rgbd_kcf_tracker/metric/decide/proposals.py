@@ -114,7 +114,7 @@ def _split(
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
     k = view.intrinsics
-    x, y, z = expected.position
+    x, y, z = expected.position.tolist()
     if z < 0.2:
         return []
     large = facts.area > TOO_LARGE * body.area
@@ -124,17 +124,18 @@ def _split(
         return []
     beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
     above = min(2 * expected.sigma[1] + 0.15, 0.5)
-    rows, cols = view.shape
-    left = int(np.clip((x - beside) * k.fx / z + k.cx, 0, cols))
-    right = int(np.clip((x + beside) * k.fx / z + k.cx + 1, 0, cols))
-    top = int(np.clip((y - above) * k.fy / z + k.cy, 0, rows))
-    bottom = int(np.clip((y + body.height + above) * k.fy / z + k.cy + 1, 0, rows))
-    if right - left < 3 or bottom - top < 3:
+    part = view.part(
+        (x - beside) * k.fx / z + k.cx,
+        (y - above) * k.fy / z + k.cy,
+        (x + beside) * k.fx / z + k.cx,
+        (y + body.height + above) * k.fy / z + k.cy,
+    )
+    depth = view.depth[part]
+    if min(depth.shape) < 3:
         return []
-    depth = view.depth[top:bottom, left:right]
-    mask = large[scene.surfaces.labels[top:bottom, left:right]]
+    mask = large[scene.surfaces.labels[part]]
     mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
-    mask &= ~others.within(slice(top, bottom), slice(left, right))
+    mask &= ~others.within(*part)
     if not mask.any():
         return []
     pieces = surfaces_in(
@@ -146,8 +147,9 @@ def _split(
         if pieces.pixels[i] < LEAST_PIXELS or area < 0.1 * body.area:
             continue
         u, v, w, h = (int(t) for t in pieces.boxes[i])
-        part = pieces.labels[v : v + h, u : u + w] == i
-        found.append(Silhouette.of(view, left + u, top + v, part, 0, scene.rim))
+        piece = pieces.labels[v : v + h, u : u + w] == i
+        left, top = part[1].start + u, part[0].start + v
+        found.append(Silhouette.of(view, left, top, piece, 0, scene.rim))
     return found
 
 
