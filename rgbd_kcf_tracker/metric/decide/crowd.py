@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
+from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
@@ -123,6 +123,7 @@ class Account:
     settled: bool
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
+    _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def parts(self) -> Parts:
@@ -131,9 +132,10 @@ class Account:
 
     def place(self, seen: Silhouette) -> FloatArray:
         """Where a silhouette is, ``(2,)`` metres across and along the floor."""
-        left, _, right, _ = seen.metres
-        ahead = float(self.scene.forward[seen.rows, seen.cols][seen.mask].mean())
-        return np.array([(left + right) / 2, ahead])
+        place = self._places.get(seen)
+        if place is None:
+            place = self._places[seen] = place_of(self.scene, seen)
+        return place
 
     def probability(self, row: int, column: int) -> float:
         """That a sight is of one of the people rather than of any other, 0 to 1."""
@@ -469,9 +471,9 @@ class Crowd:
             person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
-            others = np.delete(account.odds[:, index], row)
-            rival = max(0.0, float(others.max())) if len(others) else 0.0
-            if account.odds[row, index] - rival < SURE:
+            odds = account.odds[:, index].tolist()
+            rival = max([0.0, *odds[:row], *odds[row + 1 :]])
+            if odds[row] - rival < SURE:
                 return
         person.upright = (
             person.upright

@@ -30,11 +30,13 @@ class Parts:
         figures: silhouettes that do not overlap.
 
     Attributes:
+        surfaces: of the scene.
         kinds: ``(h, w)``, see :data:`FIRST`.
+        length: number of kinds.
     """
 
     def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
-        self._surfaces = scene.surfaces
+        self.surfaces = scene.surfaces
         self.kinds: Kinds = scene.still.astype(np.intp)
         self.length = FIRST + len(figures)
         for kind, seen in enumerate(figures, FIRST):
@@ -55,11 +57,12 @@ class Parts:
         return counts
 
     @cached_property
-    def of_surfaces(self) -> Kinds:
-        """How many of each surface's pixels are of each kind, ``(n, kinds)``."""
-        count = len(self._surfaces)
-        both = self._surfaces.labels * self.length + self.kinds
-        return np.bincount(both.ravel(), minlength=count * self.length).reshape(count, -1)
+    def of_surfaces(self) -> npt.NDArray[np.float64]:
+        """How many of each surface's pixels are of each kind, ``(n, kinds)`` whole numbers."""
+        count = len(self.surfaces)
+        both = self.surfaces.labels * self.length + self.kinds
+        counts = np.bincount(both.ravel(), minlength=count * self.length)
+        return counts.reshape(count, -1).astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,6 @@ class Others:
     @cached_property
     def of_surfaces(self) -> npt.NDArray[np.float64]:
         """Share of each surface's pixels, ``(n,)`` 0 to 1."""
-        counts = self.parts.of_surfaces
-        shares: npt.NDArray[np.float64] = (counts @ self.theirs) / np.maximum(counts.sum(axis=1), 1)
+        theirs = self.parts.of_surfaces @ np.array(self.theirs, np.float64)
+        shares: npt.NDArray[np.float64] = theirs / np.maximum(self.parts.surfaces.pixels, 1)
         return shares

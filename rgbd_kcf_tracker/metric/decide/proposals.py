@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
+from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -49,31 +49,6 @@ class Expectation:
     reach: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Sizes of all surfaces in metres, ``(n,)`` each."""
-
-    area: FloatArray
-    x: FloatArray
-    y: FloatArray
-    width: FloatArray
-    height: FloatArray
-
-    @classmethod
-    def of(cls, scene: Scene) -> Facts:
-        """Measure every surface of a scene."""
-        k, surfaces = scene.view.intrinsics, scene.surfaces
-        z = surfaces.depth.astype(np.float64)
-        boxes = surfaces.boxes
-        return cls(
-            surfaces.areas(k),
-            (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
-            (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
-            boxes[:, 2] * z / k.fx,
-            boxes[:, 3] * z / k.fy,
-        )
-
-
 def propose(
     scene: Scene, body: Body, expected: Expectation, others: Others, most: int
 ) -> list[Silhouette]:
@@ -86,30 +61,30 @@ def propose(
         others: pixels known not to be it.
         most: largest number of whole surfaces to propose, the nearest to ``expected`` first.
     """
-    facts = Facts.of(scene)
+    sizes = scene.sizes
     z = scene.surfaces.depth
     away = np.stack(
         (
-            np.abs(facts.x - expected.position[0]) / (expected.reach[0] + body.width),
-            np.abs(facts.y - expected.position[1] - body.height / 2)
+            np.abs(sizes.x - expected.position[0]) / (expected.reach[0] + body.width),
+            np.abs(sizes.y - expected.position[1] - body.height / 2)
             / (expected.reach[1] + body.height / 2),
             np.abs(z - expected.position[2]) / (expected.reach[2] + 0.15),
         )
     ).max(axis=0)
     possible = (scene.surfaces.pixels >= LEAST_PIXELS) & (away < 1)
-    possible &= (facts.area > LEAST_SHARE * body.area) & (facts.area < MOST_SHARE * body.area)
+    possible &= (sizes.area > LEAST_SHARE * body.area) & (sizes.area < MOST_SHARE * body.area)
     possible[0] = False
     labels = np.flatnonzero(possible)
     if len(labels) > most:
         labels = labels[np.argsort(away[labels])[:most]]
     found = [scene.silhouette(int(label)) for label in labels]
-    found += _split(scene, body, expected, others, facts)
+    found += _split(scene, body, expected, others, sizes)
     narrow = (_narrowed(scene, body, seen, expected, others) for seen in found)
     return found + [seen for seen in narrow if seen is not None]
 
 
 def _split(
-    scene: Scene, body: Body, expected: Expectation, others: Others, facts: Facts
+    scene: Scene, body: Body, expected: Expectation, others: Others, sizes: Sizes
 ) -> list[Silhouette]:
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
@@ -117,8 +92,8 @@ def _split(
     x, y, z = expected.position.tolist()
     if z < 0.2:
         return []
-    large = facts.area > TOO_LARGE * body.area
-    large |= (others.of_surfaces > MIXED) & (facts.area > body.area)
+    large = sizes.area > TOO_LARGE * body.area
+    large |= (others.of_surfaces > MIXED) & (sizes.area > body.area)
     large[0] = False
     if not large.any():
         return []

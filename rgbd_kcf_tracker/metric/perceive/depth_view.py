@@ -55,9 +55,7 @@ class DepthView:
             Intrinsics(k.fx / step, k.fy / step, (k.cx - half) / step, (k.cy - half) / step),
         )
 
-    def part(
-        self, left: float, top: float, right: float, bottom: float
-    ) -> tuple[slice, slice]:
+    def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
         """Rows and columns of what lies between these pixels, as far as it is in the view."""
         rows, cols = self.shape
         return (
