@@ -111,7 +111,7 @@ def _split(
     mask = large[scene.surfaces.labels[part]]
     mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
     mask &= ~others.within(*part)
-    if not mask.any():
+    if np.count_nonzero(mask) < LEAST_PIXELS:
         return []
     pieces = surfaces_in(
         depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre
