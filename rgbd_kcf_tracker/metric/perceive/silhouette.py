@@ -216,11 +216,11 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     y1, x1 = min(height, top + rows + RING), min(width, left + cols + RING)
     around = view.depth[y0:y1, x0:x1]
     nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z))
+    if not nearer.any():
+        return Sides(False, False, False, False)
     body = np.zeros(nearer.shape, np.bool_)
     body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
     nearer &= ~body
-    if not nearer.any():
-        return Sides(False, False, False, False)
     # Between two surfaces there often is a seam without a reading.
     nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
 
