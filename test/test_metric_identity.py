@@ -366,8 +366,9 @@ def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
     one = who(account, columns[0])
     others = account.others(one)
     mine, theirs = (account.sights[c].figure.seen for c in columns)
-    assert others[theirs.rows, theirs.cols][theirs.mask].all()
-    assert not others[mine.rows, mine.cols][mine.mask].any()
+    assert others.share(theirs) == 1
+    assert others.share(mine) == 0
+    assert others.within(theirs.rows, theirs.cols)[theirs.mask].all()
     assert account.stranger(one, columns[1]) is None
     claim, wrong = account.claim(one, mine), account.claim(one, theirs)
     assert claim.mine > 0

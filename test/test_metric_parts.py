@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
-from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
+from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
@@ -270,14 +270,17 @@ def test_body_does_not_grow_into_its_neighbour():
 
 
 def test_masked_filter_answers_with_the_shift():
-    features = PatchFeatures(32)
-    image = blobs(1, 400)
+    image, features = blobs(1, 400), PatchFeatures(32)
+
+    def read(x: float, y: float) -> Spectrum:
+        return spectrum_of(features(resampled(image, x, y, 128, 128)))
+
     learned = MaskedFilter(32, 1.2, 3)
     mask = np.zeros((32, 32), np.float32)
     mask[10:22, 12:20] = 1
-    learned.learn(features(resampled(image, 200, 200, 128, 128)), mask, 1.0)
+    learned.learn(read(200, 200), mask, 1.0)
     for dx, dy in ((0, 0), (8, -4), (-12, 20)):
-        response = learned.response(features(resampled(image, 200 + dx, 200 + dy, 128, 128)))
+        response = learned.response(read(200 + dx, 200 + dy))
         row, col = np.unravel_index(int(np.argmax(response)), response.shape)
         found = ((col + 16) % 32 - 16) * 4, ((row + 16) % 32 - 16) * 4
         assert found == (-dx, -dy)

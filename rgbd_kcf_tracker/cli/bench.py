@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""``rgbd-kcf bench``: how long every tracker takes for a frame."""
+"""``rgbd-kcf bench``: how long every tracker takes for a frame, with one target or several."""
 
 from __future__ import annotations
 
@@ -18,13 +18,19 @@ from rgbd_kcf_tracker.extras import require
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
+    from rgbd_kcf_tracker.evaluation.speed import Speed
+    from rgbd_kcf_tracker.evaluation.speed_several import SpeedsOfSeveral
+    from rgbd_kcf_tracker.evaluation.table import Table
 
 NAME = 'bench'
 HELP = "time every variant, and OpenCV's KCF and CSRT where installed, on the same frames"
 
 SIZES = ('512x424:150', '960x540:100', '960x540:300', '960x540:480', '1920x1080:600')
 """sd, qhd and hd of the Kinect V2, and targets from small to as tall as the image."""
+SIZE_OF_SEVERAL = '960x540:300'
+"""For several targets: qhd and the height of a person at 3 m."""
 FEWEST_FRAMES = 20
+REFERENCE = 'opencv:csrt'
 THREADS = ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS')
 
 
@@ -39,8 +45,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--sizes',
         metavar='WxH:T,...',
-        default=','.join(SIZES),
-        help=f'image sizes and heights of the target in pixels (default {",".join(SIZES)})',
+        help=f'image sizes and heights of the target in pixels (default {",".join(SIZES)}; with '
+        f'--targets {SIZE_OF_SEVERAL})',
+    )
+    parser.add_argument(
+        '--targets',
+        metavar='N',
+        type=int,
+        nargs='+',
+        help='instead, follow that many people at once in a simulated scene in which all are in '
+        'view, as in 1 2 4 8, and report what each further one costs (default variant: metric)',
     )
     parser.add_argument(
         '--frames', metavar='N', type=int, default=180, help='frames of each (default 180)'
@@ -51,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         help='instead, run each over N frames at the first size and report the memory it holds',
     )
+    parser.add_argument('--csv', action='store_true', help='print the tables as CSV')
 
 
 def run(args: argparse.Namespace) -> int:
@@ -60,11 +75,27 @@ def run(args: argparse.Namespace) -> int:
         os.environ.setdefault(name, '1')
     from rgbd_kcf_tracker.evaluation.contenders import variant
     from rgbd_kcf_tracker.evaluation.speed import Setting, measure, soak
-    from rgbd_kcf_tracker.evaluation.table import Table
+    from rgbd_kcf_tracker.evaluation.speed_several import measure_several
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
 
-    settings = [Setting(*_size(text)) for text in args.sizes.split(',')]
+    sizes = args.sizes or (','.join(SIZES) if args.targets is None else SIZE_OF_SEVERAL)
+    settings = [Setting(*_size(text)) for text in sizes.split(',')]
     if args.frames < FEWEST_FRAMES:
         raise ParameterError(f'--frames is {args.frames}: give at least {FEWEST_FRAMES}')
+    if args.targets is not None:
+        if args.soak is not None:
+            raise ParameterError('give --targets or --soak, not both')
+        if min(args.targets) < 1 or len(set(args.targets)) < len(args.targets):
+            given = ' '.join(map(str, args.targets))
+            raise ParameterError(f'--targets is {given}: give numbers from 1, each once')
+        several = [variant(name.strip()) for name in (args.variants or DEFAULT_VARIANT).split(',')]
+        reference = _contender(REFERENCE, variant)
+        for setting in progress(settings, len(settings), NAME):
+            speeds = measure_several(
+                several, setting, args.targets, args.frames, reference, lambda: interrupts.asked
+            )
+            _print(_tables_of_several(speeds), args.csv)
+        return 0
     contenders = _contenders(args.variants, variant)
     if args.soak is not None:
         if args.soak < FEWEST_FRAMES:
@@ -80,22 +111,62 @@ def run(args: argparse.Namespace) -> int:
             )
         return 0
     for setting in progress(settings, len(settings), NAME):
-        speeds = measure(contenders, setting, args.frames, lambda: interrupts.asked)
-        reference = next((s.median() for s in speeds if s.contender == 'opencv:csrt'), None)
-        rows = tuple(
-            (
-                s.contender,
-                s.median(),
-                s.p95(),
-                s.searching_p95(),
-                _ratio(s.median(), reference),
-            )
-            for s in speeds
-        )
-        columns = ('tracker', 'median ms', 'p95 ms', 'searching p95 ms', 'median / CSRT')
-        print(Table('speed', str(setting), columns, rows, digits=2).text())
-        print(flush=True)
+        found = measure(contenders, setting, args.frames, lambda: interrupts.asked)
+        _print([_table(str(setting), found)], args.csv)
     return 0
+
+
+def _print(tables: list[Table], as_csv: bool) -> None:
+    for table in tables:
+        print(table.csv() if as_csv else f'{table.text()}\n', flush=True)
+
+
+def _table(title: str, speeds: list[Speed]) -> Table:
+    from rgbd_kcf_tracker.evaluation.table import Table
+
+    reference = next((s.median() for s in speeds if s.contender == REFERENCE), None)
+    rows = tuple(
+        (
+            s.contender,
+            s.median(),
+            s.p95(),
+            s.searching_p95(),
+            _ratio(s.median(), reference),
+        )
+        for s in speeds
+    )
+    columns = ('tracker', 'median ms', 'p95 ms', 'searching p95 ms', 'median / CSRT')
+    return Table('speed', title, columns, rows, digits=2)
+
+
+def _tables_of_several(measured: SpeedsOfSeveral) -> list[Table]:
+    """By number of targets, and what each further one costs."""
+    from rgbd_kcf_tracker.evaluation.table import Table
+
+    csrt = measured.reference
+    by_targets = tuple(
+        (
+            speed.contender,
+            targets,
+            speed.median(targets),
+            speed.mean(targets),
+            100 * speed.found[targets],
+            _ratio(speed.median(targets), csrt),
+        )
+        for speed in measured.speeds
+        for targets in speed.milliseconds
+    )
+    columns = ('tracker', 'targets', 'median ms', 'mean ms', 'found %', 'median / CSRT')
+    further = tuple(
+        (speed.contender, *costs, *(_ratio(cost, csrt) for cost in costs))
+        for speed in measured.speeds
+        for costs in [(speed.each_further(speed.median), speed.each_further(speed.mean))]
+    )
+    names = ('tracker', 'median ms', 'mean ms', 'median / CSRT', 'mean / CSRT')
+    return [
+        Table('speed_targets', f'{measured.setting}, people', columns, by_targets, digits=2),
+        Table('speed_further', 'each further target', names, further, digits=3),
+    ]
 
 
 def _ratio(value: float | None, reference: float | None) -> float | None:
@@ -124,9 +195,14 @@ def _contenders(names: str | None, variant: Callable[[str], Contender]) -> list[
     if names is not None:
         return [variant(name.strip()) for name in names.split(',')]
     found = [variant(name) for name in VARIANTS]
-    for name in ('opencv:kcf', 'opencv:csrt'):
-        try:
-            found.append(variant(name))
-        except ParameterError as missing:
-            print(f'left out: {missing}', file=sys.stderr)
-    return found
+    peers = (_contender(name, variant) for name in ('opencv:kcf', REFERENCE))
+    return found + [peer for peer in peers if peer is not None]
+
+
+def _contender(name: str, variant: Callable[[str], Contender]) -> Contender | None:
+    """One of OpenCV's trackers, None where this OpenCV has it not."""
+    try:
+        return variant(name)
+    except ParameterError as missing:
+        print(f'left out: {missing}', file=sys.stderr)
+        return None

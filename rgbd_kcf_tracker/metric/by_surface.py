@@ -192,7 +192,7 @@ class BySurface:
             if sight.figure.seen.area < MOST_SHARE * self.body.area
         ]
         found += [seen for seen in figures if not any(seen.same(other) for other in found)]
-        free = [s for s in found if others[s.rows, s.cols][s.mask].mean() < STANDING]
+        free = [s for s in found if others.share(s) < STANDING]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
         self.candidates = [
             c
@@ -330,8 +330,9 @@ class BySurface:
     def _weighed(self, account: Account, seen: Silhouette, dt: float, missing: bool) -> Candidate:
         scene, body, motion = account.scene, self.body, self.motion
         claim = account.claim(self._person, seen)
-        placed = body.place(seen, scene.codes, scene.view, motion.position, motion.sigma)
-        variance = np.square(motion.sigma) + np.square(placed.sigma)
+        sigma = motion.sigma
+        placed = body.place(seen, scene.codes, scene.view, motion.position, sigma)
+        variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
         if self._cloud is not None:
             step = self._cloud.distance(placed.position, placed.sigma)
@@ -368,7 +369,7 @@ class BySurface:
     def _outline(self, view: DepthView) -> tuple[float, float, float, float]:
         """Where the whole body is expected: left, top, right, bottom in pixels of the view."""
         k = view.intrinsics
-        x, y, z = self.motion.position
+        x, y, z = self.motion.position.tolist()
         half = self.body.width / 2
         return (
             (x - half) * k.fx / z + k.cx,
@@ -377,24 +378,13 @@ class BySurface:
             (y + self.body.height) * k.fy / z + k.cy,
         )
 
-    def _outline_slices(self, view: DepthView) -> tuple[slice, slice]:
-        """Rows and columns of the view in which the whole body is expected."""
-        if self.motion.position[2] < 0.3:
-            return slice(0, 0), slice(0, 0)
-        left, top, right, bottom = self._outline(view)
-        rows, cols = view.shape
-        x0, x1 = int(np.clip(left, 0, cols)), int(np.clip(right + 1, 0, cols))
-        y0, y1 = int(np.clip(top, 0, rows)), int(np.clip(bottom + 1, 0, rows))
-        return slice(y0, y1), slice(x0, x1)
-
     def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
         """Depth where the body is expected, and the pixels it would have if none were outside."""
         if self.motion.position[2] < 0.3:
             return np.zeros((0, 0), np.float32), 1.0
         left, top, right, bottom = self._outline(scene.view)
-        return scene.view.depth[self._outline_slices(scene.view)], max(
-            1.0, (right - left + 1) * (bottom - top + 1)
-        )
+        total = max(1.0, (right - left + 1) * (bottom - top + 1))
+        return scene.view.depth[scene.view.part(left, top, right, bottom)], total
 
     def _should_be_seen(self, scene: Scene) -> float:
         """Share of the expected body that nothing nearer, no hole and no image edge hides."""
@@ -408,7 +398,7 @@ class BySurface:
         left, _, right, _ = self._outline(scene.view)
         first, last = scene.rim.left, scene.view.shape[1] - scene.rim.right
         inside = min(right, last) - max(left, first)
-        return float(np.clip(1.0 - inside / max(right - left, 1.0), 0.0, 1.0))
+        return min(max(1.0 - inside / max(right - left, 1.0), 0.0), 1.0)
 
     def without_depth(self, scene: Scene) -> float:
         """Share of the expected body, as far as it lies in the image, that has no reading."""
@@ -429,13 +419,18 @@ class BySurface:
         left, top, right, bottom = self._outline(scene.view)
         rows, cols = scene.view.shape
         wide = right - left
-        x0 = int(np.clip(left - wide, 0, cols - 2))
-        x1 = int(np.clip(right + wide, x0 + 1, cols))
-        y0 = int(np.clip(top, 0, rows - 2))
-        y1 = int(np.clip(bottom, y0 + 1, rows))
-        other = scene.view.depth > 0
-        other[seen.rows, seen.cols] &= ~seen.mask
-        other = other[y0:y1, x0:x1]
+        x0 = int(min(max(left - wide, 0), cols - 2))
+        x1 = int(min(max(right + wide, x0 + 1), cols))
+        y0 = int(min(max(top, 0), rows - 2))
+        y1 = int(min(max(bottom, y0 + 1), rows))
+        first, start = min(y0, seen.top), min(x0, seen.left)
+        other = (
+            scene.view.depth[first : max(y1, seen.rows.stop), start : max(x1, seen.cols.stop)] > 0
+        )
+        height, width = seen.mask.shape
+        v, u = seen.top - first, seen.left - start
+        other[v : v + height, u : u + width] &= ~seen.mask
+        other = other[y0 - first : y1 - first, x0 - start : x1 - start]
         self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:

@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
@@ -252,7 +253,8 @@ class Follower:
 
     def _taken(self, account: Account, box: Box) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""
-        index = account.sight_among(account.which[_part(account, box)].ravel())
+        pixels = account.parts.kinds[_part(account, box)]
+        index = account.sight_among(account.parts.counted(pixels.ravel()))
         if index < 0 or account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
@@ -350,8 +352,8 @@ def _part(account: Account, box: Box) -> tuple[slice, slice]:
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:
     """Numbers of all of whom something shows in a box: the target may be any of them."""
-    numbers = np.unique(account.which[_part(account, box)])
-    owners = (account.owner[number - 1] for number in numbers.tolist() if number > 0)
+    kinds = np.unique(account.parts.kinds[_part(account, box)])
+    owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
     return frozenset(account.people[owner].number for owner in owners if owner >= 0)
 
 

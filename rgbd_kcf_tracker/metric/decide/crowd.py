@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures
+from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
@@ -97,7 +99,7 @@ class Claim:
     room: float
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(eq=False)
 class Account:
     """How a frame is explained.
 
@@ -122,23 +124,19 @@ class Account:
     settled: bool
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
-    _which: npt.NDArray[np.int16] | None = None
+    _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
 
-    @property
-    def which(self) -> npt.NDArray[np.int16]:
-        """For each pixel the number of its sight from 1, or 0, ``(h, w)``."""
-        if self._which is None:
-            self._which = np.zeros(self.scene.view.shape, np.int16)
-            for number, sight in enumerate(self.sights, 1):
-                seen = sight.figure.seen
-                self._which[seen.rows, seen.cols][seen.mask] = number
-        return self._which
+    @cached_property
+    def parts(self) -> Parts:
+        """Which of the sights, or the room, each pixel shows."""
+        return Parts(self.scene, [sight.figure.seen for sight in self.sights])
 
     def place(self, seen: Silhouette) -> FloatArray:
         """Where a silhouette is, ``(2,)`` metres across and along the floor."""
-        left, _, right, _ = seen.metres
-        ahead = float(self.scene.forward[seen.rows, seen.cols][seen.mask].mean())
-        return np.array([(left + right) / 2, ahead])
+        place = self._places.get(seen)
+        if place is None:
+            place = self._places[seen] = place_of(self.scene, seen)
+        return place
 
     def probability(self, row: int, column: int) -> float:
         """That a sight is of one of the people rather than of any other, 0 to 1."""
@@ -151,15 +149,16 @@ class Account:
 
     def sight_of(self, seen: Silhouette) -> int:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
-        return self.sight_among(self.which[seen.rows, seen.cols][seen.mask])
+        return self.sight_among(self.parts.counts(seen))
 
-    def sight_among(self, pixels: npt.NDArray[np.int16]) -> int:
-        """Index of the sight that most of some pixels of :attr:`which` show, -1 for none."""
-        if not self.sights:
-            return -1
-        counts = np.bincount(pixels, minlength=len(self.sights) + 1)
-        best = int(np.argmax(counts[1:]))
-        return best if counts[best + 1] > MOST * len(pixels) else -1
+    def sight_among(self, counts: list[int]) -> int:
+        """Index of the sight that most of some pixels belong to, -1 for none.
+
+        Args:
+            counts: of the pixels, see :meth:`Parts.counted`.
+        """
+        most = max(counts[FIRST:], default=0)
+        return counts.index(most, FIRST) - FIRST if most > MOST * sum(counts) else -1
 
     def figure_of(self, seen: Silhouette) -> int:
         """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
@@ -205,7 +204,8 @@ class Account:
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
-        return float(self.scene.still[seen.rows, seen.cols][seen.mask].mean())
+        counts = self.parts.counts(seen)
+        return counts[ROOM] / sum(counts)
 
     def _room_beside(self, person: Person, seen: Silhouette) -> float:
         """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
@@ -225,22 +225,16 @@ class Account:
         mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
         return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
 
-    def others(self, person: Person) -> npt.NDArray[np.bool_]:
-        """The pixels that are surely not a person's, ``(h, w)`` bool.
+    def others(self, person: Person) -> Others:
+        """The pixels that are surely not a person's.
 
         They belong to somebody who was seen beside him, or are the room where he is no part of it.
         """
-        theirs = np.zeros(len(self.sights) + 1, np.bool_)
-        theirs[0] = person.mobile
-        for number, owner in enumerate(self.owner, 1):
-            met = owner >= 0 and self.people[owner].number in person.met
-            theirs[number] = met and person.area >= SMALL
-        if not theirs.any():
-            return np.zeros(self.which.shape, np.bool_)
-        mask: npt.NDArray[np.bool_] = theirs[self.which]
-        if person.mobile:
-            mask &= self.scene.still | (self.which != 0)
-        return mask
+        met = [
+            owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
+            for owner in self.owner
+        ]
+        return Others(self.parts, [False, person.mobile, *met])
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.
@@ -489,17 +483,20 @@ class Crowd:
             return
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
-        if account.settled and seen.area > WHOLE:
+        if account.settled and not person.mobile and seen.area > WHOLE:
             before = account.scene.before[seen.rows, seen.cols][seen.mask]
-            person.mobile |= bool(before.mean() > 1 - PART_OF_ROOM)
+            person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
         if index >= 0 and row < len(account.odds):
-            others = np.delete(account.odds[:, index], row)
-            rival = max(0.0, float(others.max())) if len(others) else 0.0
-            if account.odds[row, index] - rival < SURE:
+            odds = account.odds[:, index].tolist()
+            rival = max([0.0, *odds[:row], *odds[row + 1 :]])
+            if odds[row] - rival < SURE:
                 return
-        person.upright |= upright(seen, scene.view.intrinsics, view.top)
-        person.upright |= account.settled and person_sized(seen)
+        person.upright = (
+            person.upright
+            or (account.settled and person_sized(seen))
+            or upright(seen, scene.view.intrinsics, view.top)
+        )
         if view.top is not None and view.top > 1.2:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted

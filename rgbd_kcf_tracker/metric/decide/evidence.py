@@ -140,5 +140,5 @@ CUE_WORDS = {
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
-    logit = float(WEIGHTS @ evidence.features())
-    return float(1.0 / (1.0 + np.exp(-np.clip(logit, -30.0, 30.0))))
+    logit = min(max(float(WEIGHTS @ evidence.features()), -30.0), 30.0)
+    return float(1.0 / (1.0 + np.exp(-logit)))

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
+from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
 
 FloatArray = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 LEAST_PIXELS = 12
 LEAST_SHARE = 0.06
@@ -49,33 +49,8 @@ class Expectation:
     reach: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Sizes of all surfaces in metres, ``(n,)`` each."""
-
-    area: FloatArray
-    x: FloatArray
-    y: FloatArray
-    width: FloatArray
-    height: FloatArray
-
-    @classmethod
-    def of(cls, scene: Scene) -> Facts:
-        """Measure every surface of a scene."""
-        k, surfaces = scene.view.intrinsics, scene.surfaces
-        z = surfaces.depth.astype(np.float64)
-        boxes = surfaces.boxes
-        return cls(
-            surfaces.areas(k),
-            (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
-            (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
-            boxes[:, 2] * z / k.fx,
-            boxes[:, 3] * z / k.fy,
-        )
-
-
 def propose(
-    scene: Scene, body: Body, expected: Expectation, others: Mask, most: int
+    scene: Scene, body: Body, expected: Expectation, others: Others, most: int
 ) -> list[Silhouette]:
     """Surfaces within reach, as they are and cut to the target.
 
@@ -83,60 +58,60 @@ def propose(
         scene: of now.
         body: the target.
         expected: where it is expected.
-        others: ``(h, w)`` bool, pixels known not to be it.
+        others: pixels known not to be it.
         most: largest number of whole surfaces to propose, the nearest to ``expected`` first.
     """
-    facts = Facts.of(scene)
+    sizes = scene.sizes
     z = scene.surfaces.depth
     away = np.stack(
         (
-            np.abs(facts.x - expected.position[0]) / (expected.reach[0] + body.width),
-            np.abs(facts.y - expected.position[1] - body.height / 2)
+            np.abs(sizes.x - expected.position[0]) / (expected.reach[0] + body.width),
+            np.abs(sizes.y - expected.position[1] - body.height / 2)
             / (expected.reach[1] + body.height / 2),
             np.abs(z - expected.position[2]) / (expected.reach[2] + 0.15),
         )
     ).max(axis=0)
     possible = (scene.surfaces.pixels >= LEAST_PIXELS) & (away < 1)
-    possible &= (facts.area > LEAST_SHARE * body.area) & (facts.area < MOST_SHARE * body.area)
+    possible &= (sizes.area > LEAST_SHARE * body.area) & (sizes.area < MOST_SHARE * body.area)
     possible[0] = False
     labels = np.flatnonzero(possible)
     if len(labels) > most:
         labels = labels[np.argsort(away[labels])[:most]]
     found = [scene.silhouette(int(label)) for label in labels]
-    found += _split(scene, body, expected, others, facts)
+    found += _split(scene, body, expected, others, sizes)
     narrow = (_narrowed(scene, body, seen, expected, others) for seen in found)
     return found + [seen for seen in narrow if seen is not None]
 
 
 def _split(
-    scene: Scene, body: Body, expected: Expectation, others: Mask, facts: Facts
+    scene: Scene, body: Body, expected: Expectation, others: Others, sizes: Sizes
 ) -> list[Silhouette]:
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
     k = view.intrinsics
-    x, y, z = expected.position
+    x, y, z = expected.position.tolist()
     if z < 0.2:
         return []
-    large = facts.area > TOO_LARGE * body.area
-    if others.any():
-        large |= (_shares(scene, others) > MIXED) & (facts.area > body.area)
+    large = sizes.area > TOO_LARGE * body.area
+    large |= (others.of_surfaces > MIXED) & (sizes.area > body.area)
     large[0] = False
     if not large.any():
         return []
     beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
     above = min(2 * expected.sigma[1] + 0.15, 0.5)
-    rows, cols = view.shape
-    left = int(np.clip((x - beside) * k.fx / z + k.cx, 0, cols))
-    right = int(np.clip((x + beside) * k.fx / z + k.cx + 1, 0, cols))
-    top = int(np.clip((y - above) * k.fy / z + k.cy, 0, rows))
-    bottom = int(np.clip((y + body.height + above) * k.fy / z + k.cy + 1, 0, rows))
-    if right - left < 3 or bottom - top < 3:
+    part = view.part(
+        (x - beside) * k.fx / z + k.cx,
+        (y - above) * k.fy / z + k.cy,
+        (x + beside) * k.fx / z + k.cx,
+        (y + body.height + above) * k.fy / z + k.cy,
+    )
+    depth = view.depth[part]
+    if min(depth.shape) < 3:
         return []
-    depth = view.depth[top:bottom, left:right]
-    mask = large[scene.surfaces.labels[top:bottom, left:right]]
+    mask = large[scene.surfaces.labels[part]]
     mask &= np.abs(depth - np.float32(z)) < 0.25 + 2 * min(expected.sigma[2], 0.3)
-    mask &= ~others[top:bottom, left:right]
-    if not mask.any():
+    mask &= ~others.within(*part)
+    if np.count_nonzero(mask) < LEAST_PIXELS:
         return []
     pieces = surfaces_in(
         depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre
@@ -147,8 +122,9 @@ def _split(
         if pieces.pixels[i] < LEAST_PIXELS or area < 0.1 * body.area:
             continue
         u, v, w, h = (int(t) for t in pieces.boxes[i])
-        part = pieces.labels[v : v + h, u : u + w] == i
-        found.append(Silhouette.of(view, left + u, top + v, part, 0, scene.rim))
+        piece = pieces.labels[v : v + h, u : u + w] == i
+        left, top = part[1].start + u, part[0].start + v
+        found.append(Silhouette.of(view, left, top, piece, 0, scene.rim))
     return found
 
 
@@ -157,21 +133,20 @@ def _narrowed(
     body: Body,
     seen: Silhouette,
     expected: Expectation,
-    others: Mask,
+    others: Others,
 ) -> Silhouette | None:
     """The part of a too wide silhouette that most likely is the target, by colour and place."""
     k = scene.view.intrinsics
     wanted = body.width * 1.1
     if not body.width_known or seen.width < 1.3 * wanted:
         return None
-    known = others[seen.rows, seen.cols]
-    if seen.area < TOO_LARGE * body.area and known[seen.mask].mean() < MIXED:
+    if seen.area < TOO_LARGE * body.area and others.share(seen) < MIXED:
         return None
     cols = max(2, round(wanted * k.fx / seen.depth))
     codes = scene.codes[seen.rows, seen.cols]
     odds = body.odds_of(codes, seen, scene.view, float(expected.position[1]))
     odds[~seen.mask] = 0
-    odds -= np.float32(0.5) * known
+    odds -= np.float32(0.5) * others.within(seen.rows, seen.cols)
     profile = np.convolve(odds.sum(axis=0), np.ones(cols), 'valid')
     middle = seen.left + np.arange(len(profile)) + cols / 2
     x = (middle - k.cx) * seen.depth / k.fx
@@ -190,15 +165,8 @@ def _narrowed(
     )
 
 
-def _shares(scene: Scene, others: Mask) -> FloatArray:
-    """Share of each surface's pixels that are others', ``(n,)``."""
-    surfaces = scene.surfaces
-    total = np.bincount(surfaces.labels[others], minlength=len(surfaces))
-    return np.asarray(total / np.maximum(surfaces.pixels, 1))
-
-
 def gathered(
-    scene: Scene, body: Body, seen: Silhouette, placed: Placed, others: Mask
+    scene: Scene, body: Body, seen: Silhouette, placed: Placed, others: Others
 ) -> Silhouette | None:
     """A silhouette with the pieces that lie within the body that it belongs to.
 
@@ -225,8 +193,7 @@ def gathered(
     inside &= surfaces.pixels >= 3
     inside[0] = False
     inside[seen.label] = False
-    if inside.any() and others.any():
-        inside &= _shares(scene, others) < 0.5
+    inside &= others.of_surfaces < 0.5
     more = boxes[inside]
     if not len(more):
         return None

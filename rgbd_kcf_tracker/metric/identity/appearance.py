@@ -15,8 +15,8 @@ from scipy import fft
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
-from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter
-from rgbd_kcf_tracker.metric.identity.patch import Features, PatchFeatures
+from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
+from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 
 Image = npt.NDArray[np.uint8]
 
@@ -50,12 +50,12 @@ class Sighting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Reading:
-    """What a window about ``cx, cy`` shows: features of the filter, and codes of its colours."""
+    """What a window about ``cx, cy`` shows: to the filter, and codes of its colours."""
 
     cx: float
     cy: float
     scale: float
-    features: Features
+    spectrum: Spectrum
     codes: npt.NDArray[np.int32]
 
 
@@ -126,7 +126,8 @@ class Appearance:
 
     def _read(self, color: Image, cx: float, cy: float, scale: float) -> _Reading:
         window = resampled(color, cx, cy, self._base * scale, self._pixels)
-        return _Reading(cx, cy, scale, self._features(window), rgb_codes(window))
+        spectrum = spectrum_of(self._features(window))
+        return _Reading(cx, cy, scale, spectrum, rgb_codes(window))
 
     def posterior(self, color: Image) -> npt.NDArray[np.float32]:
         """How likely each pixel of an image is the target's by its colour, ``(h, w)`` 0 to 1."""
@@ -144,7 +145,7 @@ class Appearance:
         return self._sighted(self._read(color, cx, cy, scale))
 
     def _sighted(self, read: _Reading) -> Sighting:
-        response = self._filter.response(read.features)
+        response = self._filter.response(read.spectrum)
         total = response
         if self._share > 0:
             posterior = self._colors.of(read.codes)
@@ -186,7 +187,7 @@ class Appearance:
             rate = min(MAX_RATE, 1 - (1 - self._rate) ** (dt / FRAME))
             color_rate = min(MAX_RATE, COLOR_RATE * rate)
         self._colors.learn(read.codes, self._inner, self._near & ~self._outer, color_rate)
-        self._filter.learn(read.features, self._mask(read.codes), rate)
+        self._filter.learn(read.spectrum, self._mask(read.codes), rate)
 
     def _mask(self, codes: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
         """Where in the window the filter may look: the pixels of the target's colours."""

@@ -77,7 +77,7 @@ class Body:
         self._usual_area = first.area
         self._colors = np.zeros((BANDS, CODES), np.float32)
         self._around = np.full(CODES, 1 / CODES, np.float32)
-        self.odds = np.zeros((BANDS, CODES), np.float32)
+        self._odds: npt.NDArray[np.float32] | None = None
 
     # -- where a silhouette puts the body ---------------------------------------------------------
 
@@ -166,7 +166,11 @@ class Body:
         """
         row, rows = self._rows(seen, view, top)
         band = bands_of_rows(codes.shape[0], row, rows)
-        result: npt.NDArray[np.float32] = self.odds[band[:, None], codes]
+        if self._odds is None:
+            floor = np.float32(ODDS_FLOOR)
+            odds = np.log((self._colors + floor) / (self._around + floor))
+            self._odds = np.clip(odds, -ODDS_LIMIT, ODDS_LIMIT)
+        result: npt.NDArray[np.float32] = self._odds[band[:, None], codes]
         return result
 
     # -- learning ---------------------------------------------------------------------------------
@@ -217,6 +221,7 @@ class Body:
         rates[total <= 8] = 0.0
         r = rates[:, None].astype(np.float32)
         self._colors = (1 - r) * self._colors + r * (counts / np.maximum(total, 1)[:, None])
+        self._odds = None
 
     def learn_around(self, codes: Codes, known: npt.NDArray[np.bool_], dt: float | None) -> None:
         """Follow the colours of what stands beside the body: ``codes`` where ``known``."""
@@ -226,9 +231,7 @@ class Body:
         total = counts.sum()
         if total > 20:
             self._around = (1 - rate) * self._around + rate * counts / total
-        floor = np.float32(ODDS_FLOOR)
-        odds = np.log((self._colors + floor) / (self._around + floor))
-        self.odds = np.clip(odds, -ODDS_LIMIT, ODDS_LIMIT)
+        self._odds = None
 
 
 def _depth_sigma(z: float) -> float:

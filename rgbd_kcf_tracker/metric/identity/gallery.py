@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from statistics import median
 
 import cv2
 import numpy as np
@@ -64,7 +66,7 @@ _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
 _SLICE_WEIGHT = np.array([HEAD_WEIGHT] + [1.0] * (SLICES - 1), np.float32)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class View:
     """One sighting of somebody's look.
 
@@ -118,7 +120,7 @@ class View:
             top,
         )
 
-    @property
+    @cached_property
     def total(self) -> float:
         """Square metres that show."""
         return float(self.area.sum())
@@ -237,17 +239,20 @@ HEIGHT_MEMORY = 25
 
 
 class Gallery:
-    """The views by which one is known, and the height of the head."""
+    """The views by which one is known, and the height of the head.
+
+    Attributes:
+        views: the first and the newest.
+        looks: the same stacked, None while there is none.
+        top: median height of the head above the floor in metres, None where it is not known.
+    """
 
     def __init__(self) -> None:
         self.views: list[View] = []
         self.looks: Looks | None = None
+        self.top: float | None = None
         self._tops: list[float] = []
-
-    @property
-    def top(self) -> float | None:
-        """Median height of the head above the floor in metres, None where it is not known."""
-        return float(np.median(self._tops)) if self._tops else None
+        self._largest = 0.0
 
     def log_odds(self, view: View, alike: float | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
@@ -261,12 +266,13 @@ class Gallery:
             return odds
         if alike is None:
             alike = float(similarity(view, self.looks).max())
-        area = min(view.total, max(each.total for each in self.views))
+        area = min(view.total, self._largest)
         return odds + look_log_odds(alike, area, len(self.views))
 
     def learn_height(self, top: float) -> None:
         """Take a height of the head above the floor, in metres."""
         self._tops = [*self._tops[1 - HEIGHT_MEMORY :], top]
+        self.top = float(median(self._tops))
 
     def learn(self, view: View) -> None:
         """Take a view that is surely of this person, where it shows something new."""
@@ -279,6 +285,7 @@ class Gallery:
                 self.views.pop(self._most_redundant())
         self.views.append(view)
         self.looks = Looks.of(self.views)
+        self._largest = max(each.total for each in self.views)
 
     def _most_redundant(self) -> int:
         assert self.looks is not None

@@ -15,6 +15,7 @@ not, however many frames are seen, so their variance is added to what the filter
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,7 +116,7 @@ class Belief:
                 turn @ self.velocity_covariance @ turn.T,
             )
         numbers = (told.position, told.velocity, told.covariance, told.velocity_covariance)
-        return told if all(np.isfinite(n).all() for n in numbers) else None
+        return told if math.isfinite(sum(float(n.sum()) for n in numbers)) else None
 
 
 class MiddleFilter:
@@ -236,13 +237,13 @@ def in_metres(belief: Belief | None, frame: Frame) -> Belief | None:
 
 def triple(values: FloatArray) -> tuple[float, float, float]:
     """A ``(3,)`` array as a track has it."""
-    x, y, z = (float(v) for v in values)
+    x, y, z = values.tolist()
     return x, y, z
 
 
 def row_by_row(values: FloatArray) -> tuple[float, ...]:
     """A ``(3, 3)`` array as a track has it."""
-    return tuple(float(v) for v in values.ravel())
+    return tuple(values.ravel().tolist())
 
 
 def _middle(view: DepthView, seen: Silhouette) -> FloatArray:

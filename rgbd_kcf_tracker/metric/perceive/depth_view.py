@@ -55,6 +55,14 @@ class DepthView:
             Intrinsics(k.fx / step, k.fy / step, (k.cx - half) / step, (k.cy - half) / step),
         )
 
+    def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
+        """Rows and columns of what lies between these pixels, as far as it is in the view."""
+        rows, cols = self.shape
+        return (
+            slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
+            slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
+        )
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""

@@ -265,7 +265,11 @@ def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figu
     highest = seen.highest(scene.elevation)
     if highest is not None and highest < LEAST_TOP:
         return None
-    left_end, _, right_end, _ = seen.metres
-    ahead = float(scene.forward[seen.rows, seen.cols][mask].mean())
-    place = np.array([(left_end + right_end) / 2, ahead])
-    return Figure(seen, None if seen.cut.top else highest, place, parted)
+    return Figure(seen, None if seen.cut.top else highest, place_of(scene, seen), parted)
+
+
+def place_of(scene: Scene, seen: Silhouette) -> FloatArray:
+    """Where a silhouette is, ``(2,)`` metres across and along the floor."""
+    left, _, right, _ = seen.metres
+    ahead = float(scene.forward[seen.rows, seen.cols][seen.mask].mean())
+    return np.array([(left + right) / 2, ahead])

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +19,12 @@ from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, standing, surfaces_in
+from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 from rgbd_kcf_tracker.pose import Pose
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """One frame's depth, surfaces and colours at the resolution of the view.
 
@@ -54,6 +55,7 @@ class Scene:
     rim: Rim
     codes: npt.NDArray[np.int32]
     motion: Pose | Lost | None
+    _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
     @property
     def ahead(self) -> npt.NDArray[np.float64]:
@@ -62,11 +64,20 @@ class Scene:
             return np.array([0.0, 0.0, 1.0])
         return self.floor.ahead(self.view.intrinsics)
 
+    @cached_property
+    def sizes(self) -> Sizes:
+        """Places and sizes of the surfaces."""
+        return Sizes.of(self.surfaces, self.view.intrinsics)
+
     def silhouette(self, label: int) -> Silhouette:
-        """One surface as a silhouette."""
-        left, top, width, height = (int(v) for v in self.surfaces.boxes[label])
-        mask = self.surfaces.labels[top : top + height, left : left + width] == label
-        return Silhouette.of(self.view, left, top, mask, label, self.rim)
+        """One surface as a silhouette; the same for whoever asks."""
+        seen = self._silhouettes.get(label)
+        if seen is None:
+            left, top, width, height = self.surfaces.boxes[label].tolist()
+            mask = self.surfaces.labels[top : top + height, left : left + width] == label
+            seen = Silhouette.of(self.view, left, top, mask, label, self.rim)
+            self._silhouettes[label] = seen
+        return seen
 
 
 class SceneReader:

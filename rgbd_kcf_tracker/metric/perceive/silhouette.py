@@ -22,6 +22,9 @@ RING = 2
 """Pixels of the view beyond the outline in which something nearer is looked for."""
 CUT_SHARE = 0.3
 """Share of one side's outline beside which something nearer must lie for that side to be cut."""
+UPPER = 0.98
+"""Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
+_SEAM = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +120,7 @@ class Silhouette:
         """
         if elevation is None:
             return None
-        return float(np.percentile(elevation[self.rows, self.cols][self.mask], 98))
+        return _upper_end(elevation[self.rows, self.cols][self.mask])
 
     def same(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view has the same pixels."""
@@ -194,27 +197,43 @@ class Silhouette:
         return cls(left, top, mask, label, z, area, cut, metres)
 
 
+def _upper_end(values: npt.NDArray[np.float32]) -> float:
+    """The 98th percentile of ``(n,)``: ``np.percentile`` takes five times as long."""
+    place = UPPER * (len(values) - 1)
+    low = int(place)
+    high = min(low + 1, len(values) - 1)
+    ordered = np.partition(values, (low, high))
+    share = place - low
+    step = ordered[high] - ordered[low]
+    return float(ordered[low] + step * share if share < 0.5 else ordered[high] - step * (1 - share))
+
+
 def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) -> Sides:
     """The sides along which something nearer lies."""
     rows, cols = mask.shape
     height, width = view.shape
     y0, x0 = max(0, top - RING), max(0, left - RING)
     y1, x1 = min(height, top + rows + RING), min(width, left + cols + RING)
-    body = np.zeros((y1 - y0, x1 - x0), np.bool_)
-    body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
     around = view.depth[y0:y1, x0:x1]
-    nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z)) & ~body
+    nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z))
+    if not nearer.any():
+        return Sides(False, False, False, False)
+    body = np.zeros(nearer.shape, np.bool_)
+    body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
+    nearer &= ~body
     # Between two surfaces there often is a seam without a reading.
-    nearer = cv2.dilate(nearer.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
+    nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
 
-    def hidden(dy: int, dx: int) -> bool:
-        shifted = np.zeros_like(body)
-        h, w = body.shape
-        shifted[max(0, dy) : h + min(0, dy), max(0, dx) : w + min(0, dx)] = body[
-            max(0, -dy) : h + min(0, -dy), max(0, -dx) : w + min(0, -dx)
-        ]
-        shifted &= ~body
-        total = int(np.count_nonzero(shifted))
-        return total > 0 and int(np.count_nonzero(nearer & shifted)) > CUT_SHARE * total
+    def hidden(to: tuple[slice, slice], of: tuple[slice, slice]) -> bool:
+        """Along the side on which the pixels ``to`` lie beyond those ``of`` the body."""
+        beyond = body[of] & ~body[to]
+        total = int(np.count_nonzero(beyond))
+        return total > 0 and int(np.count_nonzero(nearer[to] & beyond)) > CUT_SHARE * total
 
-    return Sides(hidden(0, -RING), hidden(-RING, 0), hidden(0, RING), hidden(RING, 0))
+    first, last = np.s_[:-RING], np.s_[RING:]
+    return Sides(
+        hidden(np.s_[:, first], np.s_[:, last]),
+        hidden(np.s_[first, :], np.s_[last, :]),
+        hidden(np.s_[:, last], np.s_[:, first]),
+        hidden(np.s_[last, :], np.s_[first, :]),
+    )

@@ -44,6 +44,30 @@ class Surfaces:
         return result
 
 
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Places and sizes of all surfaces in metres, seen from the camera, ``(n,)`` each."""
+
+    area: npt.NDArray[np.float64]
+    x: npt.NDArray[np.float64]
+    y: npt.NDArray[np.float64]
+    width: npt.NDArray[np.float64]
+    height: npt.NDArray[np.float64]
+
+    @classmethod
+    def of(cls, surfaces: Surfaces, k: Intrinsics) -> Sizes:
+        """Measure every surface of a view with intrinsics ``k``."""
+        z = surfaces.depth.astype(np.float64)
+        boxes = surfaces.boxes
+        return cls(
+            surfaces.areas(k),
+            (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
+            (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
+            boxes[:, 2] * z / k.fx,
+            boxes[:, 3] * z / k.fy,
+        )
+
+
 def standing(
     view: DepthView, elevation: npt.NDArray[np.float32] | None, margin: float
 ) -> npt.NDArray[np.bool_]:

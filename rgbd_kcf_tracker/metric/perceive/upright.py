@@ -8,6 +8,8 @@ For a person who has not moved yet nothing else tells them from furniture.
 
 from __future__ import annotations
 
+from statistics import median
+
 import numpy as np
 import numpy.typing as npt
 
@@ -64,7 +66,7 @@ def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
     shoulders = wide[rows]
     if not len(head) or not len(shoulders):
         return False
-    head_width, shoulder_width = float(np.median(head)), float(np.median(shoulders))
+    head_width, shoulder_width = float(median(head.tolist())), float(median(shoulders.tolist()))
     if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
         return False
     if not SHOULDER_WIDTH[0] <= shoulder_width <= SHOULDER_WIDTH[1]:
