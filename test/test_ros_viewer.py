@@ -30,6 +30,8 @@ from ros_rig import Rig, overrides, running_node, scene
 
 from rgbd_kcf_tracker import Box, Frame, Track, TrackState
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.insight import Insight
+from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
 from rgbd_kcf_tracker.view.commands import Command
@@ -163,7 +165,8 @@ def test_several_targets_live_with_names_scores_and_trails(rig: Rig) -> None:
         until(rig, lambda: 'acceptance' in look.headers[-1]['values'])
         look.ask(do='everyone', value=True)
         until(rig, lambda: look.headers[-1]['everyone'])
-        until(rig, lambda: [t['chosen'] for t in look.headers[-1]['targets']][:2] == [True, False])
+        # Who was added stays one who was asked for, also beside everyone.
+        until(rig, lambda: [t['chosen'] for t in look.headers[-1]['targets']][:2] == [True, True])
         look.ask(do='follow', id=10**6, frame=0)
         until(rig, lambda: any('not in sight' in h['word'] for h in look.headers))
         look.ask(do='remove', id=first)
@@ -243,7 +246,8 @@ def test_a_hidden_target_has_its_ellipse() -> None:
     page = LivePage('tracker', 10)
     hidden = Track(None, TrackState.OCCLUDED, id=3, predicted=(0.5, 0.2, 2.0))
     page.answer(1_000_000_000, [hidden])
-    page.covariance(1_000_000_000, (0.04, 0, 0, 0, 0.01, 0, 0, 0, 0.25))
+    spread = (0.04, 0, 0, 0, 0.01, 0, 0, 0, 0.25)
+    page.evidence(1_000_000_000, {3: TargetEvidence(Insight(), covariance=spread)})
     page.image(Frame(np.zeros((24, 32, 3), np.uint8), stamp_ns=1_000_000_000), 1_000_000_000)
     (target,) = page.board.take((-1, 0))[2]['targets']
     x, z, major, minor, _, level = target['ellipse']

@@ -248,6 +248,8 @@ function showWhy(shown) {
   const weighed = shown.targets.filter(t => t.considered && t.considered.length);
   const target = weighed.find(t => t.id === page.why) || weighed[0];
   $('no-why').hidden = Boolean(target);
+  $('no-why').textContent = shown.variant === 'metric' ? 'No candidates were weighed in this frame.'
+    : `${shown.variant} weighs no candidates: its filter's response is in the last minute.`;
   $('why-of').hidden = !target;
   if (target && document.activeElement !== $('why-of')) {
     $('why-of').replaceChildren(...weighed.map(t => { const option = make('option', '', t.name); option.value = t.id; return option; }));
@@ -329,7 +331,6 @@ function greet(hello) {
   $('title').textContent = hello.title;
   $('kind').textContent = stored ? 'a recorded run' : hello.live ? 'live' : 'recording';
   $('transport').hidden = hello.live;
-  if (hello.live) $('no-why').textContent = 'The topics of a running tracker carry no candidates: record a bag and open it with rgbd-kcf view.';
   $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
   $('variant').disabled = Boolean(stored);
   showLegend(hello.stages);
