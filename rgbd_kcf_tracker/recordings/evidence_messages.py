@@ -152,11 +152,9 @@ def thinned(places: Array, weights: Array) -> tuple[Array, Array]:
 def _particles(places: Array, weights: Array, digits: str) -> str:
     """Places and shares of the heaviest, one particle after the other."""
     places, weights = thinned(places, weights)
-    shares = weights / weights.max()
-    return ' '.join(
-        f'{_written(place, digits)} {share:.3f}'
-        for place, share in zip(places.tolist(), shares.tolist(), strict=True)
-    )
+    rows = np.column_stack((places, weights / weights.max()))
+    row = ' '.join(['%' + digits] * places.shape[1] + ['%.3f'])
+    return ' '.join([row] * len(rows)) % tuple(rows.ravel().tolist())
 
 
 # -- reading -------------------------------------------------------------------------------------
