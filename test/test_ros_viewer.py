@@ -285,6 +285,12 @@ def test_states_of_the_answers() -> None:
     assert [e.get('dropped', 0) for e in entries] == [0, 0, 0, 3]
     assert [e['transport'] for e in entries] == [0, 0, 4.5, 0]
     assert entries[2]['track'] == 0
+    # The node says nothing of what has not happened: the first that is dropped counts.
+    page.figures({'track_median_ms': '1'})
+    page.figures({'track_median_ms': '1', 'dropped': '2'})
+    page.answer(5_000_000_000, [])
+    page.board.show({}, {})
+    assert page.board.take((-1, 0))[2]['entries'][-1]['dropped'] == 2
     # A looping bag: stamps go back, and the last minute begins anew.
     page.answer(500_000_000, [])
     assert len(page.board.take((-1, 0))[2]['entries']) == 1

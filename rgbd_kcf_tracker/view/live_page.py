@@ -205,8 +205,9 @@ class LivePage:
 
     def figures(self, values: Mapping[str, str]) -> None:
         """What ``/diagnostics`` says of the node."""
-        before = _number(self._figures.get('dropped', values.get('dropped')))
-        self._lately += max(0, int(_number(values.get('dropped')) - before))
+        dropped = _number(values.get('dropped'))  # which the node counts from the first on
+        if self._figures:
+            self._lately += max(0, int(dropped - _number(self._figures.get('dropped'))))
         self._figures = dict(values)
 
     def answer(self, stamp_ns: int, tracks: Sequence[Track]) -> None:
@@ -327,8 +328,8 @@ class LivePage:
         }
         if 'latency_median_ms' in self._figures:
             status['latency'] = round(_number(self._figures['latency_median_ms']), 1)
-        if 'dropped' in self._figures:
-            status['dropped'] = int(_number(self._figures['dropped']))
+        if self._figures:
+            status['dropped'] = int(_number(self._figures.get('dropped')))
         known = {number: looks.known for number, looks in self._looks.items()}
         seen = Seen(frame, tracks, names, chosen, _insights(answer), known, status=status)
         self.board.show(*show(seen, self._detail))
