@@ -33,6 +33,7 @@ LAYERS = (
     ('metric', 'thesis'),
     ('variants',),
     ('targets',),
+    ('insight',),
     ('recordings', 'simulation', 'cameras', 'batch'),
     ('live', 'evaluation'),
     ('ros', 'cli', 'view', 'bench'),
@@ -58,7 +59,7 @@ ROS_MODULES = {
 }  # fmt: skip
 LEAN = {
     'errors', 'lazy', 'parameters', 'lens', 'geometry', 'frame', 'track',
-    'features', 'metric', 'thesis', 'variants', 'targets',
+    'features', 'metric', 'thesis', 'variants', 'targets', 'insight',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.
 WITH_ROS = {'ros', 'bench'}

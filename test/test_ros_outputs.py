@@ -24,7 +24,7 @@ from geometry_msgs.msg import (
     TwistWithCovarianceStamped,
 )
 from rclpy.lifecycle import LifecycleNode
-from ros_rig import Rig, box_text, running_node, scene, tracker_process
+from ros_rig import Rig, box_text, play_hidden, running_node, scene, tracker_process
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, CompressedImage, RegionOfInterest
 from stand_ins import foxglove_messages, vision_messages
@@ -32,7 +32,9 @@ from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from rgbd_kcf_tracker import Box, RgbdKcfError, TrackState
+from rgbd_kcf_tracker import Box, RgbdKcfError, TargetSet, TrackState
+from rgbd_kcf_tracker.insight import Insight, insight_in
+from rgbd_kcf_tracker.recordings.evidence_messages import evidence_of
 from rgbd_kcf_tracker.recordings.images import decode_compressed_color
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon, tracks_of_state
 from rgbd_kcf_tracker.ros.messages import RosTypes, stamp_to_ns
@@ -45,17 +47,6 @@ def listen(rig: Rig, kind: Any, topic: str) -> list[Any]:
     heard: list[Any] = []
     rig.node.create_subscription(kind, f'{rig.tracker}/{topic}', heard.append, 200)
     return heard
-
-
-def play_hidden(rig: Rig, indices: range) -> None:
-    """The scene's target behind a panel that stands nearer."""
-    for index in indices:
-        color, depth, box = scene(index)
-        x, y = int(box.x) - 40, int(box.y) - 40
-        color[y : y + 160, x : x + 120] = (40, 90, 140)
-        depth[y : y + 160, x : x + 120] = 1000
-        rig.send_info(index)
-        rig.send_images(index, color, depth / 1000)
 
 
 def test_one_stamped_answer_for_each_pair(rig: Rig) -> None:
@@ -91,6 +82,17 @@ def test_one_stamped_answer_for_each_pair(rig: Rig) -> None:
         ('somewhere', {'id': '1', 'score': '0.5'}),
         ('tracking', {'id': '1'}),
         ('tracking', {'id': 'one', 'score': '0.5'}),
+        ('tracking', {'id': '1', 'score': 'nan'}),
+        (
+            'occluded',
+            {
+                'id': '1',
+                'score': '0',
+                'position_x': 'nan',
+                'position_y': '1',
+                'position_z': '1e300',
+            },
+        ),
         ('tracking', {'id': '1', 'score': '0.5', 'x': '1', 'y': '2', 'width': '3'}),
         ('tracking', {'id': '1', 'score': '1', 'x': '1', 'y': '2', 'width': '-3', 'height': '4'}),
     ],
@@ -132,6 +134,50 @@ def test_pose_and_twist_follow_the_walk_and_go_on_while_hidden(rig: Rig) -> None
         after = [stamp_to_ns(p.header.stamp) - last for p in poses]
         assert 0 < max(after) <= 0.3e9
         assert stamp_to_ns(twists[-1].header.stamp) - last > 0.5e9
+
+
+@pytest.mark.parametrize('variant', ['kcf', 'rgbd_pf', 'metric'])
+def test_evidence_is_computed_while_somebody_subscribes_and_never_else(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, variant: str
+) -> None:
+    asked: list[int] = []
+
+    def counting(targets: TargetSet, number: int) -> Insight:
+        asked.append(number)
+        return insight_in(targets, number)
+
+    monkeypatch.setattr('rgbd_kcf_tracker.live.session.insight_in', counting)
+    heard: list[DiagnosticArray] = []
+    with running_node(rig, queue_policy='all', init_box=box_text(), variant=variant) as node:
+        rig.play(range(4))
+        assert not asked
+        subscription = rig.node.create_subscription(
+            DiagnosticArray, '/tracker/evidence', heard.append, 200
+        )
+        rig.wait(lambda: node._outputs.wanted('evidence'))
+        rig.play(range(4, 8))
+        play_hidden(rig, range(8, 30))
+        rig.wait(lambda: heard and heard[-1].header == rig.boxes[-1].header)
+        assert len(asked) >= len(heard) >= 24
+        told = [evidence_of(message)[1] for message in heard]
+        rig.node.destroy_subscription(subscription)
+        rig.wait(lambda: not node._outputs.wanted('evidence'))
+        rig.wait(lambda: len(asked) == 26, timeout=10)
+        rig.play(range(30, 34))
+        assert len(asked) == 26
+    assert all(each.asked_for for each in told)
+    seen, hidden = told[2].insight, told[-1].insight
+    if variant == 'metric':
+        assert seen.considered[0].probability > 0.5
+        assert seen.considered[0].box.iou(rig.box(6)) > 0.9
+        assert {'place', 'look'} <= seen.considered[0].cues.keys()
+        assert seen.gallery
+        assert hidden.particles is not None
+        assert told[-1].covariance is not None
+        return
+    assert 0.3 < seen.response < 1.2
+    assert not seen.considered
+    assert (hidden.particle_pixels is not None) == (variant == 'rgbd_pf')
 
 
 def test_markers_show_every_target_and_go_with_it(rig: Rig) -> None:

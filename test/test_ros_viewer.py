@@ -23,13 +23,16 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[view]'")
 
 import aiohttp
+import browser as browsers
 import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from ros_rig import Rig, overrides, running_node, scene
+from ros_rig import Rig, overrides, play_hidden, running_node, scene
 
 from rgbd_kcf_tracker import Box, Frame, Track, TrackState
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.insight import Considered, Insight, KnownView
+from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
 from rgbd_kcf_tracker.view.commands import Command
@@ -163,12 +166,60 @@ def test_several_targets_live_with_names_scores_and_trails(rig: Rig) -> None:
         until(rig, lambda: 'acceptance' in look.headers[-1]['values'])
         look.ask(do='everyone', value=True)
         until(rig, lambda: look.headers[-1]['everyone'])
-        until(rig, lambda: [t['chosen'] for t in look.headers[-1]['targets']][:2] == [True, False])
+        # Who was added stays one who was asked for, also beside everyone.
+        until(rig, lambda: [t['chosen'] for t in look.headers[-1]['targets']][:2] == [True, True])
         look.ask(do='follow', id=10**6, frame=0)
         until(rig, lambda: any('not in sight' in h['word'] for h in look.headers))
         look.ask(do='remove', id=first)
         until(rig, lambda: first not in [t['id'] for t in look.headers[-1]['targets']])
         look.close()
+
+
+@pytest.mark.skipif(
+    browsers.chromium() is None,
+    reason='no Chromium: apt-get install chromium (Debian), or name one in RGBD_KCF_CHROMIUM',
+)
+def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> None:
+    """In a real browser, over DDS: candidates with cues, views, rivals, particles, the ellipse."""
+    with (
+        running_node(rig, queue_policy='all') as node,
+        running_viewer() as (_, server),
+        browsers.browser() as chromium,
+    ):
+        assert not node._outputs.wanted('evidence')  # nobody looks
+        page = chromium.page()
+        page.size(1400, 1000)
+        page.open(server.url)
+        until(rig, lambda: page.value('typeof page !== "undefined" && page.drawn > 1'))
+        box = scene(rig.index)[2]  # type: ignore[attr-defined]
+        page.value(f"send({{do: 'box', x: {box.x}, y: {box.y}, width: 36, height: 60, frame: 0}})")
+        until(rig, lambda: page.value("document.querySelectorAll('.candidate').length > 0"))
+        assert node._outputs.wanted('evidence')
+        # All of it from one frame: what was taken lies where the box is.
+        words, cues = page.value(
+            "(() => { const c = document.querySelector('.candidate'); return [c.innerText, "
+            "[...c.querySelectorAll('.cue span:first-child')].map(e => e.innerText)]; })()"
+        )
+        assert 'log-odds' in words
+        assert 'look' in cues
+        candidate, target = page.value(
+            '[page.shown.targets[0].considered[0].box, page.shown.targets[0].box]'
+        )
+        assert candidate == pytest.approx(target, abs=0.02)
+        # The view that the target is known by, with the picture of it, for it was new to us too.
+        until(rig, lambda: page.value("document.querySelectorAll('.views img').length > 0"))
+        assert page.value("document.querySelectorAll('.views b i').length") >= 9
+        assert page.value('page.shown.floor') is None  # the scene has none
+        at = rig.index + 1  # type: ignore[attr-defined]
+        play_hidden(rig, range(at, at + 20))
+        page.until("page.shown.targets[0].state !== 'tracking'")
+        assert page.value('page.shown.targets[0].particles.length') > 50
+        assert page.value('page.shown.targets[0].ellipse.length') == 6
+        confused = page.value('page.entries.map(e => e.targets[0] ? e.targets[0][3] : 0)')
+        assert all(0 <= share <= 1 for share in confused)
+        assert page.errors == []
+        page.open('about:blank')
+        rig.wait(lambda: not node._outputs.wanted('evidence'))
 
 
 def rows(text: str) -> list[str]:
@@ -234,6 +285,12 @@ def test_states_of_the_answers() -> None:
     assert [e.get('dropped', 0) for e in entries] == [0, 0, 0, 3]
     assert [e['transport'] for e in entries] == [0, 0, 4.5, 0]
     assert entries[2]['track'] == 0
+    # The node says nothing of what has not happened: the first that is dropped counts.
+    page.figures({'track_median_ms': '1'})
+    page.figures({'track_median_ms': '1', 'dropped': '2'})
+    page.answer(5_000_000_000, [])
+    page.board.show({}, {})
+    assert page.board.take((-1, 0))[2]['entries'][-1]['dropped'] == 2
     # A looping bag: stamps go back, and the last minute begins anew.
     page.answer(500_000_000, [])
     assert len(page.board.take((-1, 0))[2]['entries']) == 1
@@ -243,7 +300,8 @@ def test_a_hidden_target_has_its_ellipse() -> None:
     page = LivePage('tracker', 10)
     hidden = Track(None, TrackState.OCCLUDED, id=3, predicted=(0.5, 0.2, 2.0))
     page.answer(1_000_000_000, [hidden])
-    page.covariance(1_000_000_000, (0.04, 0, 0, 0, 0.01, 0, 0, 0, 0.25))
+    spread = (0.04, 0, 0, 0, 0.01, 0, 0, 0, 0.25)
+    page.evidence(1_000_000_000, {3: TargetEvidence(Insight(), covariance=spread)})
     page.image(Frame(np.zeros((24, 32, 3), np.uint8), stamp_ns=1_000_000_000), 1_000_000_000)
     (target,) = page.board.take((-1, 0))[2]['targets']
     x, z, major, minor, _, level = target['ellipse']
@@ -251,3 +309,70 @@ def test_a_hidden_target_has_its_ellipse() -> None:
     assert (major, minor) == pytest.approx((2.4477 * 0.5, 2.4477 * 0.2), abs=1e-3)
     with pytest.raises(BoxError, match='not in sight'):
         page.box_of(3)
+
+
+def looks(view: int, **more: Any) -> dict[int, TargetEvidence]:
+    """Evidence of target 3, whose gallery has so many views."""
+    views = tuple(KnownView(((0.1 * n, 0.5, 0.5),), 1.8) for n in range(view))
+    return {3: TargetEvidence(Insight(gallery=views, **more))}
+
+
+def frame_at(stamp: int) -> Frame:
+    return Frame(np.full((60, 80, 3), 90, np.uint8), stamp_ns=stamp)
+
+
+def test_evidence_and_answer_make_one_entry_whichever_comes_first() -> None:
+    page = LivePage('tracker', 10)
+    here, there = Box(0, 0, 20, 40), Box(50, 0, 20, 40)
+    tracks = [
+        Track(here, TrackState.TRACKING, 0.9, id=3),
+        Track(there, TrackState.TRACKING, 0.8, id=5),
+    ]
+    weighed = (Considered(here, 0.9, {'look': 2.0}), Considered(there, 0.4, {'look': -0.4}))
+    evidence = looks(1, considered=weighed, response=0.7)
+    page.answer(1, tracks)  # nothing is known of evidence yet: noted at once
+    page.evidence(1, evidence)
+    page.answer(2, tracks)
+    page.evidence(2, evidence)
+    page.evidence(3, evidence)
+    assert not page.complete(3)
+    page.answer(3, tracks)
+    page.answer(4, tracks)  # its evidence is lost
+    assert not page.complete(4)
+    page.answer(5, tracks)
+    page.evidence(5, evidence)
+    assert page.complete(5)
+    page.board.show({}, {})
+    entries = page.board.take((-1, 0))[2]['entries']
+    assert [e['targets'][0][3:6] for e in entries] == [
+        (0.0, None, None), (0.4, 5, 0.7), (0.4, 5, 0.7), (0.0, None, None), (0.4, 5, 0.7),
+    ]  # fmt: skip
+    page.image(frame_at(5), 5)
+    first, second = page.board.take((-1, 0))[2]['targets']
+    assert [c['cues'] for c in first['considered']] == [{'look': 2.0}, {'look': -0.4}]
+    assert 'considered' not in second
+
+
+def test_views_have_the_pictures_that_they_are_of_or_none() -> None:
+    """Whoever opens the page late sees by what a target is known, but no picture of another day."""
+    page = LivePage('tracker', 10)
+
+    def moment(stamp: int, views: int) -> list[bool]:
+        page.answer(stamp, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
+        page.evidence(stamp, looks(views))
+        page.image(frame_at(stamp), stamp)
+        shown = page.board.take((-1, 0))[2]['targets'][0]['colors']
+        assert len(shown) == views
+        blobs = page.board.take((-1, 0))[3]
+        return [f'view_3_{n}' in blobs for n in range(views)]
+
+    assert moment(10**9, 2) == [False, False]
+    assert moment(2 * 10**9, 3) == [False, False, True]
+    fresh = LivePage('tracker', 10)
+    fresh.answer(1, [])
+    page = fresh
+    assert moment(2, 1) == [True]
+    # An image from long after a view came up is no picture of it.
+    page.answer(3, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
+    page.evidence(3, looks(2))
+    assert moment(10**10, 2) == [True, False]

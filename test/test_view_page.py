@@ -372,6 +372,31 @@ def test_nothing_sticks_out_on_desktop_and_phone(
     assert (back == 'rgb(17, 20, 23)') == dark
 
 
+@pytest.mark.parametrize('dark', [False, True])
+def test_words_on_buttons_can_be_read_under_the_mouse(
+    chromium: Browser, served: Served, dark: bool
+) -> None:
+    page = opened(chromium, served, dark=dark)
+    ratio = (
+        "(() => {{ const e = document.querySelector('{}'), s = getComputedStyle(e); "
+        'const light = c => c.match(/[0-9.]+/g).slice(0, 3).map(v => v / 255)'
+        '.map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)'
+        '.reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0.05); '
+        'const a = light(s.color), b = light(s.backgroundColor); '
+        'return Math.max(a, b) / Math.min(a, b); }})()'
+    )
+    for selector in ('#play', '#back', '#defaults', '#targets button'):
+        x, y = page.value(
+            f"(() => {{ const e = document.querySelector('{selector}'); "
+            "e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect(); "
+            'return [b.x + b.width / 2, b.y + b.height / 2]; })()'
+        )
+        page.mouse('mouseMoved', x, y, 0)
+        page.until(f"document.querySelector('{selector}').matches(':hover')")
+        # The ratio of contrast that WCAG 2 asks for (1.4.3).
+        assert page.value(ratio.format(selector)) > 4.5, selector
+
+
 def test_a_finger_picks_only_when_told(chromium: Browser, untracked: Served) -> None:
     page = opened(chromium, untracked, width=390, height=844, phone=True)
     box = untracked.truth

@@ -23,11 +23,11 @@ pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[vi
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState, create_tracker
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.insight import Insight, insight_of
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.export import export
-from rgbd_kcf_tracker.view.insight import Insight, insight_of
 from rgbd_kcf_tracker.view.player import Player
 from rgbd_kcf_tracker.view.showing import (
     Detail,
@@ -388,7 +388,7 @@ def test_the_ellipse_holds_what_it_says() -> None:
 
 
 def test_confusion_is_of_what_was_not_taken() -> None:
-    from rgbd_kcf_tracker.view.insight import Considered
+    from rgbd_kcf_tracker.insight import Considered
 
     here, there = Box(0, 0, 10, 10), Box(50, 0, 10, 10)
     insight = Insight((Considered(here, 0.9, {}), Considered(there, 0.4, {})))

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import draw_track
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker
 from rgbd_kcf_tracker.view.showing import depth_picture
@@ -29,6 +30,9 @@ WIDTH = 320
 EVERY = 3
 """Tracked at 15 Hz, shown at 5: a third of the bytes."""
 COLORS = 64
+LINE = 2
+"""Pixels by which the box is drawn larger: so small a picture has its line about the target, not over
+it."""
 
 Picture = npt.NDArray[np.uint8]
 
@@ -48,7 +52,8 @@ def pictures(first: int, last: int) -> Iterator[Picture]:
         scale = WIDTH / frame.width
         shown = track.box
         if shown is not None:
-            shown = type(shown)(*(side * scale for side in shown.as_tuple()))
+            x, y, width, tall = (side * scale for side in shown.as_tuple())
+            shown = Box(x - LINE, y - LINE, width + 2 * LINE, tall + 2 * LINE)
         # The sensor's noise would be most of the bytes.
         small = cv2.medianBlur(small, 3)
         drawn = draw_track(small, type(track)(shown, track.state, track.score, track.depth))

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track
 
@@ -25,6 +27,9 @@ class Answer:
             or is the camera's own.
         others: tracks of the other targets that are followed.
         frame: what was seen; None where it was not looked at or could not be read.
+        asked_for: ids of those of the tracks whom somebody chose or added.
+        insights: computes what is known of each by id, until the next pair is taken; None where
+            nothing was tracked.
     """
 
     header: Any
@@ -33,6 +38,8 @@ class Answer:
     frame: Frame | None = None
     others: tuple[Track, ...] = ()
     place: Pose | None = None
+    asked_for: frozenset[int] = frozenset()
+    insights: Callable[[], Mapping[int, Insight]] | None = None
 
     @property
     def tracks(self) -> tuple[Track, ...]:

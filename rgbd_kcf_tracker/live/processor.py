@@ -9,7 +9,7 @@ A message is whatever has the fields of its type; no ROS is needed to make one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
@@ -17,6 +17,7 @@ from typing import Any, Protocol
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.live.answer import Answer
 from rgbd_kcf_tracker.live.places import CameraPlaces, Places
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
@@ -146,6 +147,7 @@ class Processor:
         frame: Frame | None = None
         track = IDLE
         others: tuple[Track, ...] = ()
+        insights: Callable[[], Mapping[int, Insight]] | None = None
         places = Places()
         decoded = begun
         if session.needs_frame or image_wanted:
@@ -159,6 +161,7 @@ class Processor:
                 try:
                     track = in_picture(session.process(frame), frame)
                     others = tuple(in_picture(other, frame) for other in session.others)
+                    insights = session.insights
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
@@ -168,7 +171,16 @@ class Processor:
                     if places.fixed is None:
                         frame = replace(frame, pose=None)
         tracked = time.monotonic_ns()
-        answer = Answer(header, track, moment.time_ns, frame, others, places.target)
+        answer = Answer(
+            header,
+            track,
+            moment.time_ns,
+            frame,
+            others,
+            places.target,
+            session.asked_for,
+            insights,
+        )
         self._publishers.publish(answer)
         published = time.monotonic_ns()
         latency = (self._now_ns() - stamp_of(capture.color)) / 1e6

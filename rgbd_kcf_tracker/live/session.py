@@ -18,6 +18,7 @@ import numpy as np
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.insight import Insight, insight_in
 from rgbd_kcf_tracker.live.story import Story, taken
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.pose import Pose
@@ -115,6 +116,20 @@ class Session:
     def camera_motion(self) -> Pose | None:
         """How the camera seems to have moved in the last frame; None for not at all, or unknown."""
         return None if self._targets.metric is None else self._targets.metric.camera_motion
+
+    @property
+    def asked_for(self) -> frozenset[int]:
+        """Ids of those who were chosen or added, not of those who are followed with everyone."""
+        return frozenset(self._known() | {self.track.id}) - {IDLE.id}
+
+    def insights(self) -> dict[int, Insight]:
+        """What is known by id of each who is followed, after the last frame; computed now."""
+        told = {track.id for track in (self.track, *self.others)}
+        return {
+            number: insight_in(self._targets, inner)
+            for inner, number in self._ids.items()
+            if number in told
+        }
 
     @property
     def needs_frame(self) -> bool:

@@ -30,6 +30,39 @@ POSITION_KEYS = ('position_x', 'position_y', 'position_z')
 PREDICTED_KEY = 'predicted'
 
 
+LARGEST = 1e9
+"""Of any number that is read: pixels, metres and log-odds stay far below."""
+
+
+def target_name(place: int, track: Track) -> str:
+    """How a status is named that tells of the target at a place of the answer, from 0."""
+    return 'target' if place == 0 else f'target_{track.id}'
+
+
+def number(text: str) -> float:
+    """The number that is written.
+
+    Raises:
+        ValueError: where it is none, not finite, or beyond reason.
+    """
+    value = float(text)
+    if not abs(value) <= LARGEST:  # nor is NaN
+        raise ValueError(f'{text[:40]} is no number that can be')
+    return value
+
+
+def numbers(text: str, count: int) -> tuple[float, ...]:
+    """The numbers that are written, apart by spaces.
+
+    Raises:
+        ValueError: where they are not so many, or one is none, see :func:`number`.
+    """
+    found = tuple(map(number, text.split()))
+    if len(found) != count:
+        raise ValueError(f'{len(found)} numbers where {count} belong')
+    return found
+
+
 def tracks_of_state(msg: Any) -> list[Track]:
     """The targets of a ``~/state``, the chosen one first.
 
@@ -44,15 +77,15 @@ def _track_of(status: Any) -> Track:
     try:
         box = place = None
         if BOX_KEYS[0] in values:
-            box = Box(*(float(values[name]) for name in BOX_KEYS))
+            box = Box(*(number(values[name]) for name in BOX_KEYS))
         if POSITION_KEYS[0] in values:
-            x, y, z = (float(values[name]) for name in POSITION_KEYS)
+            x, y, z = (number(values[name]) for name in POSITION_KEYS)
             place = (x, y, z)
         predicted = values.get(PREDICTED_KEY) == 'true'
         return Track(
             box,
             TrackState(status.message),
-            float(values['score']),
+            number(values['score']),
             None if place is None or predicted else place[2],
             None if predicted else place,
             int(values['id']),

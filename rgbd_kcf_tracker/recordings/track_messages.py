@@ -21,7 +21,12 @@ from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import PackedImage, RawImage
 from rgbd_kcf_tracker.recordings.message_types import MessageTypes
-from rgbd_kcf_tracker.recordings.messages import BOX_KEYS, POSITION_KEYS, PREDICTED_KEY
+from rgbd_kcf_tracker.recordings.messages import (
+    BOX_KEYS,
+    POSITION_KEYS,
+    PREDICTED_KEY,
+    target_name,
+)
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 from rgbd_kcf_tracker.track import Track
 
@@ -71,7 +76,7 @@ class TrackMessages:
         for number, track in enumerate(tracks):
             status = make(
                 'diagnostic_msgs/msg/DiagnosticStatus',
-                name='target' if number == 0 else f'target_{track.id}',
+                name=target_name(number, track),
                 message=track.state.value,
                 values=[
                     make('diagnostic_msgs/msg/KeyValue', key=key, value=value)

@@ -15,6 +15,7 @@ from rclpy.qos import QoSProfile
 from rgbd_kcf_tracker.live.answer import Answer
 from rgbd_kcf_tracker.live.settings import ALL, OFF, NodeParameters
 from rgbd_kcf_tracker.recordings.encoding import encode_compressed_color
+from rgbd_kcf_tracker.recordings.evidence_messages import evidence_array
 from rgbd_kcf_tracker.recordings.foxglove import ANNOTATIONS, image_annotations
 from rgbd_kcf_tracker.recordings.messages import header_stamp
 from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
@@ -27,6 +28,8 @@ from rgbd_kcf_tracker.ros.transforms import TargetFrames
 RESULT_DEPTH = 100
 """History of the result topics: three seconds at 30 Hz for a consumer that pauses."""
 IMAGE_DEPTH = 2
+EVIDENCE_DEPTH = 10
+"""History of what is for people to look at: some kilobytes each."""
 NO_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Each event that somebody could wait for costs the executor some 10 us with each message of any
 topic; the defaults, two for each topic, only log a QoS that does not fit."""
@@ -51,6 +54,7 @@ OPTIONAL = {
 }
 """Of packages that are not in every ROS 2."""
 ANNOTATED, COMPRESSED = 'image_annotated', 'image_annotated/compressed'
+EVIDENCE = {'evidence': 'diagnostic_msgs/msg/DiagnosticArray'}
 PICTURES = {ANNOTATED: 'sensor_msgs/msg/Image', COMPRESSED: 'sensor_msgs/msg/CompressedImage'}
 IN_PICTURE = {'state', 'box', 'occluded', 'roi', 'camera_info'}
 IN_SPACE = frozenset(TOPICS) - IN_PICTURE | {'detections3d'}
@@ -80,6 +84,8 @@ class TrackPublishers:
         self._all: dict[str, Any] = {}
         for topic, kind in TOPICS.items():
             self._create(topic, kind, RESULT_DEPTH)
+        for topic, kind in EVIDENCE.items():
+            self._create(topic, kind, EVIDENCE_DEPTH)
         for topic, kind in PICTURES.items():
             self._create(topic, kind, IMAGE_DEPTH)
         for topic, kind in OPTIONAL.items():
@@ -169,6 +175,10 @@ class TrackPublishers:
         header, frame, make = answer.header, answer.frame, self._make
         if frame is None:
             return
+        if answer.insights is not None and self.wanted('evidence'):
+            known, asked_for = answer.insights(), answer.asked_for
+            message = evidence_array(ROS_TYPES, header, answer.tracks, known, asked_for)
+            self._send('evidence', message)
         if self.wanted('annotations'):
             self._send('annotations', image_annotations(ROS_TYPES, header, answer.tracks))
         if frame.intrinsics is not None and self.wanted('camera_info'):

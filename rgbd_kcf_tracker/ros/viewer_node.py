@@ -3,8 +3,9 @@
 
 """The page over a running tracker: a node of its own that only listens and asks.
 
-It subscribes to the images while somebody looks and to nothing larger than answers in words while
-nobody does, in another process than the tracker, which neither waits for it nor knows of it.
+It subscribes to the images, and to why the tracker decides as it does, while somebody looks, and to
+nothing larger than answers in words while nobody does, in another process than the tracker, which
+neither waits for it nor knows of it.
 """
 
 from __future__ import annotations
@@ -13,9 +14,7 @@ import queue
 from contextlib import suppress
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseWithCovarianceStamped
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
@@ -31,6 +30,7 @@ from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.parameters import ParameterInfo, describe
 from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
+from rgbd_kcf_tracker.recordings.evidence_messages import evidence_of
 from rgbd_kcf_tracker.recordings.images import (
     decode_color,
     decode_compressed_color,
@@ -48,6 +48,8 @@ from rgbd_kcf_tracker.view.live_page import (
     node_parameter,
 )
 
+LIGHT = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Of answers in words: a page that is late shows the newest."""
 POLL_S = 0.05
 SETTINGS_S = 2.0
 LINGER_S = 3.0
@@ -78,21 +80,17 @@ class ViewerNode(Node):
         # Its full name, as diagnostics and messages to people have it.
         self._tracker = self.resolve_topic_name(f'{tracker}/state').removesuffix('/state')
         self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
-        light = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self.create_subscription(DiagnosticArray, f'{tracker}/state', self._on_state, light)
-        self.create_subscription(
-            PoseWithCovarianceStamped, f'{tracker}/pose_with_covariance', self._on_pose, light
-        )
+        self.create_subscription(DiagnosticArray, f'{tracker}/state', self._on_state, LIGHT)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._init = self.create_publisher(RegionOfInterest, f'{tracker}/init', 10)
         self._add = self.create_publisher(RegionOfInterest, f'{tracker}/add', 10)
         self._remove = self.create_publisher(UInt32, f'{tracker}/remove', 10)
         self._remote = AsyncParameterClient(self, tracker)
-        self._images: list[Any] = []
+        self._evidence = f'{tracker}/evidence'
+        self._looked_at: list[Any] = []
         self._depths: dict[int, Any] = {}
         self._colors: dict[int, Any] = {}
         self._camera: Camera | None = None
-        self._frame_id = ''
         self._unwatched = 0.0
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._poll, clock=steady)
@@ -111,15 +109,12 @@ class ViewerNode(Node):
     # -- what comes -------------------------------------------------------------------------------
 
     def _on_state(self, message: DiagnosticArray) -> None:
-        self._frame_id = message.header.frame_id
         with suppress(RgbdKcfError):  # of somebody else's
             self.page.answer(stamp_of(message), tracks_of_state(message))
 
-    def _on_pose(self, message: PoseWithCovarianceStamped) -> None:
-        # In another frame (the tracker's target_frame) its axes are not the picture's.
-        if message.header.frame_id == self._frame_id:
-            spread = np.reshape(message.pose.covariance, (6, 6))[:3, :3]
-            self.page.covariance(stamp_of(message), tuple(float(v) for v in spread.ravel()))
+    def _on_evidence(self, message: DiagnosticArray) -> None:
+        with suppress(RgbdKcfError):  # of somebody else's
+            self.page.evidence(stamp_of(message), evidence_of(message))
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -166,17 +161,20 @@ class ViewerNode(Node):
             self._show()
 
     def _listen_or_not(self) -> None:
-        """Subscribe to the images when somebody looks, and no more a while after all have gone."""
+        """Subscribe to what is large when somebody looks, and no more a while after all have gone.
+
+        That is the images, and why the tracker decided as it did.
+        """
         if self.page.board.watched:
             self._unwatched = 0.0
-            if not self._images:
+            if not self._looked_at:
                 self._listen()
             return
         self._unwatched += POLL_S
-        if self._images and self._unwatched >= LINGER_S:
-            for made in self._images:
+        if self._looked_at and self._unwatched >= LINGER_S:
+            for made in self._looked_at:
                 self.destroy_subscription(made)
-            self._images.clear()
+            self._looked_at.clear()
             self._colors.clear()
             self._depths.clear()
 
@@ -191,13 +189,19 @@ class ViewerNode(Node):
             kind, name = (Image, topic)
             if transport != RAW:
                 kind, name = CompressedImage, f'{self.resolve_topic_name(topic)}/{transport}'
-            self._images.append(self.create_subscription(kind, name, callback, qos))
-        self._images.append(self.create_subscription(CameraInfo, CAMERA_INFO, self._on_info, qos))
+            self._looked_at.append(self.create_subscription(kind, name, callback, qos))
+        self._looked_at += [
+            self.create_subscription(CameraInfo, CAMERA_INFO, self._on_info, qos),
+            self.create_subscription(DiagnosticArray, self._evidence, self._on_evidence, LIGHT),
+        ]
 
     def _show(self) -> None:
-        """The newest image that has its depth; the newest of all where none has."""
+        """The newest image that has its depth and its answer; the newest of all where none has."""
         paired = [s for s in self._colors if self._depth_of(s) is not None]
-        stamp = max(paired or self._colors)
+        answered = [s for s in paired or self._colors if self.page.complete(s)]
+        if not answered and self.page.answering and len(self._colors) < HELD:
+            return  # its answer may still come
+        stamp = max(answered or paired or self._colors)
         color, depth = self._colors[stamp], self._depth_of(stamp)
         if depth is None and self._depths and len(self._colors) < HELD:
             return  # its depth may still come

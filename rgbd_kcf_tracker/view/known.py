@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import cv2
-import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.identity.gallery import View
-from rgbd_kcf_tracker.view.insight import colors_of
+from rgbd_kcf_tracker.insight import KnownView
+from rgbd_kcf_tracker.recordings.evidence_messages import hex_color
 
 HEIGHT = 96
 QUALITY = 80
@@ -26,17 +25,25 @@ class Known:
 
     Attributes:
         view: the tracker's own; None of a tracker that keeps none, for the first sight.
-        picture: JPEG; empty where the target's place in the image was not known.
-        colors: mean colours of the slices from head to feet as '#rrggbb', '' where nothing shows.
+        picture: JPEG; empty where the image that the view is of, or the target's place in it, was
+            not known.
     """
 
-    view: View | None
+    view: KnownView | None
     picture: bytes
-    colors: tuple[str, ...] = ()
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """Of the view's slices from head to feet as '#rrggbb', '' where nothing shows."""
+        return () if self.view is None else tuple(map(hex_color, self.view.colors))
 
 
 def known_by(
-    gallery: Sequence[View], before: Sequence[Known], frame: Frame, box: Box | None
+    gallery: Sequence[KnownView],
+    before: Sequence[Known],
+    frame: Frame,
+    box: Box | None,
+    older: Collection[KnownView] = (),
 ) -> tuple[Known, ...]:
     """The views of a gallery with their pictures; those that are new show the box in the frame.
 
@@ -45,29 +52,26 @@ def known_by(
         before: what was known after the frame before.
         frame: the frame.
         box: where the target is in it; None where it is not seen.
+        older: views that are new to us, but not of this frame: they get no picture.
     """
-    pictures = {id(known.view): known for known in before}
+    pictures = {known.view: known for known in before}
     if not gallery:
         first = () if before else (_taken(None, frame, box),)
         return tuple(known for known in (*before, *first) if known.picture)
-    return tuple(pictures.get(id(view)) or _taken(view, frame, box) for view in gallery)
+    return tuple(
+        pictures.get(view) or _taken(view, frame, None if view in older else box)
+        for view in gallery
+    )
 
 
-def _taken(view: View | None, frame: Frame, box: Box | None) -> Known:
-    colors = () if view is None else tuple(_named(color) for color in colors_of(view))
+def _taken(view: KnownView | None, frame: Frame, box: Box | None) -> Known:
     inside = None if box is None else box.clipped(frame.width, frame.height)
     if inside is None or inside.width < 2 or inside.height < 2:
-        return Known(view, b'', colors)
+        return Known(view, b'')
     left, top = int(inside.x), int(inside.y)
     part = frame.color[top : int(inside.bottom), left : int(inside.right)]
     width = max(1, round(part.shape[1] * HEIGHT / part.shape[0]))
     size = (min(width, 2 * HEIGHT), HEIGHT)
     small = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
     data = cv2.imencode('.jpg', small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
-    return Known(view, data, colors)
-
-
-def _named(color: np.ndarray) -> str:
-    if np.isnan(color).any():
-        return ''
-    return '#' + ''.join(f'{round(255 * float(v)):02x}' for v in color)
+    return Known(view, data)

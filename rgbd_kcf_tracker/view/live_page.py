@@ -7,34 +7,43 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import math
 import queue
 import time
 from collections import OrderedDict, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.insight import Insight, KnownView
 from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
 from rgbd_kcf_tracker.parameters import Parameters, parameter
+from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.recordings.results import HEADER, row
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, default_parameters
 from rgbd_kcf_tracker.view.board import Board
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
-from rgbd_kcf_tracker.view.showing import Detail, Seen, show
+from rgbd_kcf_tracker.view.known import Known, known_by
+from rgbd_kcf_tracker.view.showing import Detail, Seen, figures, show
 
 EVERYONE = 'follow_everyone'
 """The node's parameter that has it follow people whom nobody chose."""
 STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
 """What an answer takes its time for, as the node's diagnostics tell, each a median."""
+EXPECTED_S = 1.0
+"""Seconds after the last message for which the next of its kind is waited for."""
+NEW_NS = 500_000_000
+"""Nanoseconds after which an image no longer shows what a view was taken from."""
 _ANSWERS = 64
 _MOST_ROWS = 200_000
 _MOST_COMMANDS = 64
 _MOST_NAMES = 200
+_MOST_PEOPLE = 200
 
 
 @dataclass(frozen=True)
@@ -63,6 +72,29 @@ class ViewerParameters(Parameters):
     )
 
 
+@dataclass(slots=True)
+class _Answer:
+    """What the node said of a frame: who is where, and, where it came, why."""
+
+    tracks: dict[int, Track]
+    evidence: Mapping[int, TargetEvidence] | None = None
+
+
+@dataclass(slots=True)
+class _Looks:
+    """What is remembered of how one looks.
+
+    Attributes:
+        since_ns: stamp of the first answer that told of it; None where it was there before us.
+        born: stamps from which views are known, None of those that were there before us.
+        known: the views with their pictures.
+    """
+
+    since_ns: int | None
+    born: dict[KnownView, int | None] = field(default_factory=dict)
+    known: tuple[Known, ...] = ()
+
+
 class LivePage:
     """Answers and images of a tracker node, put together by their stamps.
 
@@ -78,11 +110,14 @@ class LivePage:
         self.values: dict[str, Any] = {}
         self._title, self._period = title, 1 / rate_hz
         self._detail = detail
-        self._answers: OrderedDict[int, tuple[Track, ...]] = OrderedDict()
+        self._answers: OrderedDict[int, _Answer] = OrderedDict()
+        self._pending: tuple[int, dict[str, Any]] | None = None
+        self._early: tuple[int, Mapping[int, TargetEvidence]] | None = None
+        self._answered_at = self._explained_at = -math.inf
+        self._looks: OrderedDict[int, _Looks] = OrderedDict()
         self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
         self._count = 0
         self._origin_ns: int | None = None
-        self._covariance: tuple[int, tuple[float, ...]] | None = None
         self._frame: Frame | None = None
         self._figures: dict[str, str] = {}
         self._lately = 0
@@ -147,13 +182,6 @@ class LivePage:
 
     # -- what the node says -----------------------------------------------------------------------
 
-    def covariance(self, stamp_ns: int, values: tuple[float, ...]) -> None:
-        """Of the chosen target's position, ``(3, 3)`` row by row, from ``~/pose_with_covariance``.
-
-        It comes a moment after the ``~/state`` of the same frame.
-        """
-        self._covariance = (stamp_ns, values)
-
     def rename(self, number: int, name: str) -> None:
         """Call a target by a name, in this page alone; the first two hundred are kept."""
         if name:
@@ -167,40 +195,93 @@ class LivePage:
         Raises:
             BoxError: where it has no box.
         """
-        tracks = next(reversed(self._answers.values()), ())
-        box = next((track.box for track in tracks if track.id == number), None)
-        if box is None:
+        track = self._latest().tracks.get(number)
+        if track is None or track.box is None:
             raise BoxError('not in sight now: try again when it is')
-        return box
+        return track.box
+
+    def _latest(self) -> _Answer:
+        return next(reversed(self._answers.values()), _Answer({}))
 
     def figures(self, values: Mapping[str, str]) -> None:
         """What ``/diagnostics`` says of the node."""
-        before = _number(self._figures.get('dropped', values.get('dropped')))
-        self._lately += max(0, int(_number(values.get('dropped')) - before))
+        dropped = _number(values.get('dropped'))  # which the node counts from the first on
+        if self._figures:
+            self._lately += max(0, int(dropped - _number(self._figures.get('dropped'))))
         self._figures = dict(values)
 
     def answer(self, stamp_ns: int, tracks: Sequence[Track]) -> None:
         """``~/state``: the answer to a frame, the chosen target first."""
-        tracks = tuple(track for track in tracks if track.state is not TrackState.IDLE)
-        self._answers[stamp_ns] = tracks
+        self._settle()
+        found = {track.id: track for track in tracks if track.state is not TrackState.IDLE}
+        self._answers[stamp_ns] = _Answer(found)
         while len(self._answers) > _ANSWERS:
             self._answers.popitem(last=False)
+        now = time.monotonic()
+        listened, self._answered_at = now - self._answered_at < EXPECTED_S, now
+        for number in found:
+            self._looks.setdefault(number, _Looks(stamp_ns if listened else None))
+            self._looks.move_to_end(number)
+        while len(self._looks) > _MOST_PEOPLE:
+            self._looks.popitem(last=False)
         if self._origin_ns is None or stamp_ns < self._origin_ns:
             self._origin_ns = stamp_ns
             self.board.rewind([])
         self._count += 1
-        self._rows.extend((self._count - 1, stamp_ns, track) for track in tracks)
-        entry = {
+        self._rows.extend((self._count - 1, stamp_ns, track) for track in found.values())
+        entry: dict[str, Any] = {
             't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
-            'targets': [
-                (t.id, t.state.value, t.score if t.box else None, 0, None, None, t.position)
-                for t in tracks
-            ],
             **{stage: _number(self._figures.get(f'{stage}_median_ms')) for stage in STAGES},
         }
         if self._lately:
             entry['dropped'], self._lately = self._lately, 0
+        self._pending = stamp_ns, entry
+        if self._early is not None and self._early[0] == stamp_ns:
+            self._answers[stamp_ns].evidence = self._early[1]
+        if self.complete(stamp_ns):
+            self._settle()
+
+    def evidence(self, stamp_ns: int, evidence: Mapping[int, TargetEvidence]) -> None:
+        """``~/evidence``: why, a moment after the answer to the same frame, or before it."""
+        now = time.monotonic()
+        listened, self._explained_at = now - self._explained_at < EXPECTED_S, now
+        for number, told in evidence.items():
+            looks = self._looks.get(number)
+            if looks is None:
+                continue
+            new = looks.since_ns is not None and stamp_ns - looks.since_ns < NEW_NS
+            born = stamp_ns if new or (listened and looks.born) else None
+            looks.born = {view: looks.born.get(view, born) for view in told.insight.gallery}
+        answer = self._answers.get(stamp_ns)
+        if answer is None:
+            self._early = stamp_ns, evidence
+            return
+        answer.evidence = evidence
+        if self._pending is not None and self._pending[0] == stamp_ns:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Put the figures of the last answer into the last minute, with its evidence if it came."""
+        if self._pending is None:
+            return
+        (stamp_ns, entry), self._pending = self._pending, None
+        answer = self._answers[stamp_ns]
+        insights = _insights(answer)
+        entry['targets'] = [figures(n, answer.tracks, insights.get(n)) for n in answer.tracks]
         self.board.note(entry)
+
+    @property
+    def answering(self) -> bool:
+        """Whether the tracker has answered a moment ago."""
+        return time.monotonic() - self._answered_at < EXPECTED_S
+
+    def complete(self, stamp_ns: int) -> bool:
+        """Whether all that is to be expected of a frame is there."""
+        answer = self._answers.get(stamp_ns)
+        if answer is None:
+            return False
+        explaining = time.monotonic() - self._explained_at < EXPECTED_S
+        return not answer.tracks or answer.evidence is not None or not explaining
 
     def due(self) -> bool:
         """Whether somebody looks and the next moment may be put up."""
@@ -210,14 +291,21 @@ class LivePage:
         """Put up an image with the answer to it, or the last one before."""
         self._shown_at = time.monotonic()
         self._frame = frame
-        latest = next(reversed(self._answers.values()), ())
-        answer = self._answers.get(stamp_ns, latest)
-        tracks = {track.id: track for track in answer}
-        if answer and self._covariance is not None and not answer[0].box:
-            first = dataclasses.replace(answer[0], covariance=self._covariance[1])
-            tracks[first.id] = first
-        # Beside everyone the chosen one alone was asked for, as far as the wire tells.
-        chosen = frozenset(list(tracks)[:1] if self.everyone else tracks)
+        if self._pending is not None and self._pending[0] <= stamp_ns:
+            self._settle()
+        answer = self._answers.get(stamp_ns, self._latest())
+        evidence = answer.evidence or {}
+        tracks = {
+            number: dataclasses.replace(
+                track, velocity=evidence[number].velocity, covariance=evidence[number].covariance
+            )
+            if number in evidence
+            else track
+            for number, track in answer.tracks.items()
+        }
+        if stamp_ns in self._answers:
+            self._remember(frame, stamp_ns, answer)
+        chosen = frozenset(number for number in tracks if self._asked_for(number, answer))
         names = {
             key: self._names.get(key, f'{"target" if key in chosen else "person"} {key}')
             for key in tracks
@@ -240,14 +328,41 @@ class LivePage:
         }
         if 'latency_median_ms' in self._figures:
             status['latency'] = round(_number(self._figures['latency_median_ms']), 1)
-        if 'dropped' in self._figures:
-            status['dropped'] = int(_number(self._figures['dropped']))
-        header, blobs = show(Seen(frame, tracks, names, chosen, status=status), self._detail)
-        self.board.show(header, blobs)
+        if self._figures:
+            status['dropped'] = int(_number(self._figures.get('dropped')))
+        known = {number: looks.known for number, looks in self._looks.items()}
+        seen = Seen(frame, tracks, names, chosen, _insights(answer), known, status=status)
+        self.board.show(*show(seen, self._detail))
+
+    def _asked_for(self, number: int, answer: _Answer) -> bool:
+        if answer.evidence is not None and number in answer.evidence:
+            return answer.evidence[number].asked_for
+        # Beside everyone the chosen one alone was, as far as the answer itself tells.
+        return not self.everyone or number == next(iter(answer.tracks), None)
+
+    def _remember(self, frame: Frame, stamp_ns: int, answer: _Answer) -> None:
+        """Keep a picture of each view that has come up about when this image was taken."""
+
+        def before(born: int | None) -> bool:
+            return born is None or abs(stamp_ns - born) > NEW_NS
+
+        for number, told in (answer.evidence or {}).items():
+            looks, track = self._looks.get(number), answer.tracks.get(number)
+            if looks is None or track is None:
+                continue
+            gallery = told.insight.gallery
+            first = bool(gallery) or not before(looks.since_ns)
+            older = [view for view in gallery if before(looks.born.get(view))]
+            box = track.box if first else None
+            looks.known = known_by(gallery, looks.known, frame, box, older)
 
     def say(self, word: str) -> None:
         """Words for the page, with the next moment."""
         self._word, self._said = word, time.monotonic()
+
+
+def _insights(answer: _Answer) -> dict[int, Insight]:
+    return {number: told.insight for number, told in (answer.evidence or {}).items()}
 
 
 def _number(text: str | None) -> float:

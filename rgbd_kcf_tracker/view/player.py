@@ -21,6 +21,7 @@ from typing import Any
 from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.parameters import Parameters, checked, describe
 from rgbd_kcf_tracker.recordings import Recording
@@ -30,10 +31,9 @@ from rgbd_kcf_tracker.variants import VARIANTS, default_parameters
 from rgbd_kcf_tracker.view.board import HISTORY_S, Board
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
-from rgbd_kcf_tracker.view.insight import Insight
 from rgbd_kcf_tracker.view.known import Known, known_by
-from rgbd_kcf_tracker.view.showing import Detail, Seen, rival, show
-from rgbd_kcf_tracker.view.targets import SAME, Targets, follows_everyone
+from rgbd_kcf_tracker.view.showing import Detail, Seen, figures, show
+from rgbd_kcf_tracker.view.targets import Targets, follows_everyone
 
 SPEEDS = (0.1, 8.0)
 SHOWN_HZ = 20.0
@@ -341,29 +341,10 @@ class Player:
             't': round((passed.stamp_ns - self._origin_ns) * 1e-9, 4),
             'frame': number,
             'targets': [
-                self._figures(key, track, passed.tracks) for key, track in passed.tracks.items()
+                figures(key, passed.tracks, self._insights.get(key)) for key in passed.tracks
             ],
             **{stage: round(self._timing.get(stage, 0.0), 2) for stage in STAGES},
         }
-
-    def _figures(self, key: int, track: Track, tracks: dict[int, Track]) -> tuple[Any, ...]:
-        """Of one target: id, state, score, confusion and with whom, response, position."""
-        insight = self._insights.get(key)
-        other = rival(track, insight)
-        who = None
-        if other is not None:
-            boxes = ((k, t.box) for k, t in tracks.items() if k != key and t.box is not None)
-            who = next((k for k, box in boxes if box.iou(other.box) > SAME), None)
-        response = None if insight is None else insight.response
-        return (
-            key,
-            track.state.value,
-            round(float(track.score), 3),
-            0.0 if other is None else round(other.probability, 3),
-            who,
-            None if response is None else round(response, 3),
-            None if track.position is None else [round(v, 2) for v in track.position],
-        )
 
     def _history(self) -> list[dict[str, Any]]:
         """The figures of the last minute before the frame that is shown."""

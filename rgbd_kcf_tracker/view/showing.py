@@ -20,21 +20,25 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.insight import Considered, Insight
+from rgbd_kcf_tracker.recordings.evidence_messages import (
+    MOST_CONSIDERED,
+    MOST_OF_OTHERS,
+    thinned,
+)
 from rgbd_kcf_tracker.track import Track, TrackState
-from rgbd_kcf_tracker.view.insight import Considered, Insight
 from rgbd_kcf_tracker.view.known import Known
+from rgbd_kcf_tracker.view.targets import SAME
 
 QUALITY = 80
-MOST_PARTICLES = 300
-MOST_CONSIDERED = 6
 DEEPEST_M = 30.0
 """Points beyond are not drawn: nearer ones fit the wire's 16 bits of millimetres."""
 _NO_DEPTH = (224, 219, 216)
 # Of two independent normal variables, 95 % lie within sqrt(-2 ln 0.05) deviations.
 _HOLDS_95 = 2.4477
 _STRANGER_AT = 0.02
-MOST_VIEWS, MOST_OF_OTHERS = 8, 1
-"""Views shown of those who are followed, the first and the newest, and of the others."""
+MOST_VIEWS = 8
+"""Views shown of those who are followed, the first and the newest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,15 +184,38 @@ def rival(track: Track, insight: Insight | None) -> Considered | None:
     return max(others, key=lambda c: c.probability, default=None)
 
 
+def figures(number: int, tracks: Mapping[int, Track], insight: Insight | None) -> tuple[Any, ...]:
+    """One of the targets in the time line.
+
+    Its id, state, score, the probability of its rival, who that is, the filter's response, and its
+    position; None for what is not known.
+    """
+    track = tracks[number]
+    other = rival(track, insight)
+    who = None
+    if other is not None:
+        boxes = ((k, t.box) for k, t in tracks.items() if k != number and t.box is not None)
+        who = next((k for k, box in boxes if box.iou(other.box) > SAME), None)
+    response = None if insight is None else insight.response
+    return (
+        number,
+        track.state.value,
+        round(float(track.score), 3) if track.box is not None else None,
+        0.0 if other is None else round(other.probability, 3),
+        who,
+        None if response is None else round(response, 3),
+        None if track.position is None else [round(v, 2) for v in track.position],
+    )
+
+
 def _corners(box: Box | None) -> list[float] | None:
     return None if box is None else [round(v, 2) for v in box.as_tuple()]
 
 
 def _particles(places: npt.NDArray[Any], weights: npt.NDArray[Any], digits: int = 2) -> Any:
-    step = max(1, -(-len(places) // MOST_PARTICLES))
-    heaviest = float(weights.max()) or 1.0
-    shares = (weights[::step] / heaviest).round(2)
-    return np.column_stack((places[::step].round(digits), shares)).tolist()
+    places, weights = thinned(places, weights)
+    shares = (weights / weights.max()).round(2)
+    return np.column_stack((places.round(digits), shares)).tolist()
 
 
 def ellipse(particles: npt.NDArray[Any], weights: npt.NDArray[Any]) -> list[float]:

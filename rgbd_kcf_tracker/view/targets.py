@@ -14,10 +14,10 @@ from collections.abc import Iterator, Mapping
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.insight import Insight, insight_in
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.track import Track
-from rgbd_kcf_tracker.view.insight import Insight, insight_in
 
 MOST = 16
 """Targets at once."""

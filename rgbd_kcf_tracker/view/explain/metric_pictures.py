@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.insight import COMPUTED_BY, Insight, insight_of
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION
 from rgbd_kcf_tracker.metric.decide.evidence import CUE_WORDS
 from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud
@@ -35,7 +36,6 @@ from rgbd_kcf_tracker.view.explain.picture import (
     show_image,
     signs,
 )
-from rgbd_kcf_tracker.view.insight import COMPUTED_BY, Insight, colors_of, insight_of
 from rgbd_kcf_tracker.view.watch import name_of
 
 _DEFAULTS = MetricParameters()
@@ -243,7 +243,8 @@ def _gallery(seen: _Seen) -> Picture:
     show_image(axes[0], rgb(frame), f'frame {number}')
     if track.box is not None:
         draw_box(axes[0], track.box, SEEN)
-    stripes = np.stack([colors_of(view) for view in insight.gallery], axis=1)
+    nothing = (np.nan,) * 3
+    stripes = np.stack([[c or nothing for c in view.colors] for view in insight.gallery], axis=1)
     slices = len(stripes)
     axes[1].set_facecolor(plot_style.NOTHING)
     axes[1].imshow(np.ma.masked_invalid(stripes).filled(0.85), interpolation='nearest')

@@ -44,13 +44,14 @@ function drawPicture(canvas, bitmap, shown, trails, drag) {
   const [fx, fy, cx, cy] = shown.camera;
   const seenAt = ([x, y, z]) => z > 0.1 ? [fx * x / z + cx, fy * y / z + cy] : null;
   if (shown.truth) outline(g, shown.truth, '#ffffff', 1 * unit, [5 * unit, 4 * unit]);
+  const placed = [];
   for (const target of shown.targets) {
     if (target.chosen) path(g, (trails.get(target.id) || []).map(seenAt), colorOf(target.id), 1.5 * unit);
     if (target.ellipse) path(g, rim(target.ellipse).map(seenAt), colorOf(target.id), 1.5 * unit);
     for (const [x, y, weight] of target.pixels || []) {
       g.fillStyle = colorOf(target.id);
       g.globalAlpha = 0.25 + 0.65 * weight;
-      g.fillRect(x - unit, y - unit, 2 * unit, 2 * unit);
+      g.fillRect(x - 1.5 * unit, y - 1.5 * unit, 3 * unit, 3 * unit);
     }
     for (const [x, y, z, weight] of target.particles || []) {
       const at = seenAt([x, y, z]);
@@ -62,7 +63,7 @@ function drawPicture(canvas, bitmap, shown, trails, drag) {
     g.globalAlpha = 1;
     if (!target.box && target.predicted) {
       const at = seenAt(target.predicted);
-      if (at) label(g, `${target.name}, hidden`, [at[0], at[1] + 17 * unit], colorOf(target.id), unit);
+      if (at) label(g, placed, `${target.name}, hidden`, [at[0], at[1] + 17 * unit], colorOf(target.id), unit);
     }
     for (const other of (target.considered || []).slice(0, 6)) {
       if (!target.box || distance(other.box, target.box) > 4)
@@ -70,9 +71,10 @@ function drawPicture(canvas, bitmap, shown, trails, drag) {
     }
     if (target.box) {
       outline(g, target.box, colorOf(target.id), (target.chosen ? 2.5 : 1.2) * unit, []);
-      caption(g, target, unit, width);
     }
   }
+  // Last, so that no box crosses out a name; those who were asked for come first.
+  for (const target of shown.targets) if (target.box) caption(g, placed, target, unit, width);
   if (drag) outline(g, drag, '#ffffff', 2 * unit, [6 * unit, 4 * unit]);
 }
 
@@ -114,7 +116,17 @@ function outline(g, [x, y, width, height], color, thickness, dash) {
   g.setLineDash([]);
 }
 
-function caption(g, target, unit, imageWidth) {
+/** Where words that are so large find room: above what is there already, as often as it takes. */
+function roomFor(placed, left, top, width, height) {
+  const over = () => placed.some(([x, y, w, h]) => left < x + w && x < left + width && top < y + h && y < top + height);
+  const first = top;
+  while (over() && top > height) top -= height + 1;
+  if (over()) for (top = first; over() && top < first + 20 * height;) top += height + 1;
+  placed.push([left, top, width, height]);
+  return top;
+}
+
+function caption(g, placed, target, unit, imageWidth) {
   const [x, y] = target.box;
   let words = target.name;
   if (target.score !== null) words += `  ${Math.round(100 * target.score)} %`;
@@ -123,7 +135,7 @@ function caption(g, target, unit, imageWidth) {
   g.font = `600 ${size}px system-ui, sans-serif`;
   const width = g.measureText(words).width + 10 * unit;
   const left = Math.max(0, Math.min(x, imageWidth - width));
-  const top = y > 19 * unit ? y - 19 * unit : y + 2 * unit;
+  const top = roomFor(placed, left, y > 19 * unit ? y - 19 * unit : y + 2 * unit, width, 17 * unit);
   g.fillStyle = colorOf(target.id);
   g.fillRect(left, top, width, 17 * unit);
   g.fillStyle = '#10151a';
@@ -193,6 +205,7 @@ function drawAbove(canvas, shown, points, trails) {
   g.beginPath(); g.moveTo(cx, cy - 7); g.lineTo(cx - 6, cy + 5); g.lineTo(cx + 6, cy + 5); g.fill();
   g.textAlign = 'center';
   g.fillText('camera', cx, cy + 14);
+  const placed = [];
   for (const target of shown.targets) {
     const color = colorOf(target.id);
     const trail = trails.get(target.id) || [];
@@ -216,26 +229,27 @@ function drawAbove(canvas, shown, points, trails) {
       g.ellipse(...at(x, z), Math.max(1, major * scale), Math.max(1, minor * scale), -angle, 0, 2 * Math.PI);
       g.strokeStyle = color;
       g.stroke();
-      label(g, `${target.name}, 95 %`, at(x, z), color);
+      label(g, placed, `${target.name}, 95 %`, at(x, z), color);
     }
     if (target.position) {
       const [u, v] = at(target.position[0], target.position[2]);
       g.beginPath(); g.arc(u, v, target.chosen ? 6 : 4, 0, 2 * Math.PI); g.fill();
       g.strokeStyle = theme('card'); g.lineWidth = 1.5; g.stroke();
-      label(g, target.name, [u, v - 4], color);
+      label(g, placed, target.name, [u, v - 4], color);
     }
   }
 }
 
-function label(g, words, [u, v], color, unit = 1) {
+function label(g, placed, words, [u, v], color, unit = 1) {
   g.font = `600 ${11 * unit}px system-ui, sans-serif`;
   g.textAlign = 'center';
   g.textBaseline = 'middle';
   const width = g.measureText(words).width + 8 * unit;
+  const top = roomFor(placed, u - width / 2, v - 24 * unit, width, 15 * unit);
   g.fillStyle = color;
-  g.fillRect(u - width / 2, v - 24 * unit, width, 15 * unit);
+  g.fillRect(u - width / 2, top, width, 15 * unit);
   g.fillStyle = '#10151a';
-  g.fillText(words, u, v - 16 * unit);
+  g.fillText(words, u, top + 8 * unit);
   g.textAlign = 'left';
 }
 

@@ -216,6 +216,7 @@ function showPeople(list, people) {
         strip.append(...slices.map(color => { const cell = make('i'); cell.style.background = color; return cell; }));
         if (urls[i]) { const image = make('img'); image.src = urls[i]; image.alt = `a view of ${target.name}`; view.append(image); }
         if (slices.length) view.append(strip);
+        if (slices.length && !urls[i]) view.title += '; no picture of it came to this page';
         return view;
       }));
     }
@@ -248,6 +249,8 @@ function showWhy(shown) {
   const weighed = shown.targets.filter(t => t.considered && t.considered.length);
   const target = weighed.find(t => t.id === page.why) || weighed[0];
   $('no-why').hidden = Boolean(target);
+  $('no-why').textContent = shown.variant === 'metric' ? 'No candidates were weighed in this frame.'
+    : `${shown.variant} weighs no candidates: its filter's response is in the last minute.`;
   $('why-of').hidden = !target;
   if (target && document.activeElement !== $('why-of')) {
     $('why-of').replaceChildren(...weighed.map(t => { const option = make('option', '', t.name); option.value = t.id; return option; }));
@@ -259,7 +262,7 @@ function showWhy(shown) {
     const taken = target.box && distance(candidate.box, target.box) < 1;
     const other = taken ? null : shown.targets.find(t => t !== target && t.box && overlap(t.box, candidate.box) > 0.5);
     head.append(make('b', '', `${Math.round(100 * candidate.probability)} %`), make('span', 'quiet',
-      `  ${taken ? 'taken' : 'not taken'}${other ? ` (${other.name})` : ''}, log-odds ${odds >= 0 ? '+' : '−'}${Math.abs(odds).toFixed(1)}, at ${candidate.box.map(v => Math.round(v)).join(', ')}`));
+      `  ${taken ? 'taken' : 'not taken'}${other ? ` (${other.name})` : ''}, log-odds ${odds >= 0 ? '+' : '−'}${Math.abs(odds).toFixed(1)}, at\u00a0${candidate.box.map(v => Math.round(v)).join(',\u00a0')}`));
     card.append(head);
     for (const [name, value] of Object.entries(candidate.cues)) {
       if (Math.abs(value) < 0.05) continue;
@@ -329,7 +332,6 @@ function greet(hello) {
   $('title').textContent = hello.title;
   $('kind').textContent = stored ? 'a recorded run' : hello.live ? 'live' : 'recording';
   $('transport').hidden = hello.live;
-  if (hello.live) $('no-why').textContent = 'The topics of a running tracker carry no candidates: record a bag and open it with rgbd-kcf view.';
   $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
   $('variant').disabled = Boolean(stored);
   showLegend(hello.stages);

@@ -273,10 +273,11 @@ class Room {
       g.fillText('This browser draws no WebGL: see the room from above.', width / 2, height / 2);
       return;
     }
+    const placed = [];
     for (const target of this.shown.targets) {
       const place = target.position || target.predicted || (target.ellipse && [target.ellipse[0], target.ellipse[5], target.ellipse[1]]);
       const at = place && this.project(m, place, width, height);
-      if (at) label(g, target.name, at, colorOf(target.id));
+      if (at) label(g, placed, target.name, at, colorOf(target.id));
     }
   }
 }

@@ -3,13 +3,15 @@
 
 """What a tracker knows after a frame beyond its answer, in one form for every tracker.
 
-The one place of ``view`` that knows the inside of ``metric``: pictures and page go through it.
+The one place outside the engines that knows their inside: page, pictures and the topic
+``~/evidence`` go through it. Nothing is computed before somebody asks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -54,6 +56,20 @@ class Considered:
     mask: Array | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class KnownView:
+    """A view of a gallery, to look at; two are equal where the same is remembered.
+
+    Attributes:
+        colors: mean colour of each slice of the body from head to feet as the gallery remembers it,
+            red, green and blue from 0 to 1; None where nothing of the slice shows.
+        top: metres above the floor of the head's top; None where that is not known.
+    """
+
+    colors: tuple[tuple[float, float, float] | None, ...]
+    top: float | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Insight:
     """What a tracker knows after a frame.
@@ -80,7 +96,7 @@ class Insight:
     view_depth: Array | None = None
     floor: tuple[float, float, float] | None = None
     step: int = 1
-    gallery: tuple[View, ...] = ()
+    gallery: tuple[KnownView, ...] = ()
     response: float | None = None
 
 
@@ -119,7 +135,7 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
     """What is known of one of several targets after the last frame."""
     account, follower = targets.account, targets._followers.get(number)
     person = targets.person(number) if follower is None else follower.person
-    gallery = () if person is None else tuple(person.gallery.views)
+    gallery = () if person is None else tuple(map(known_view, person.gallery.views))
     if follower is None:
         return Insight(gallery=gallery)
     response = follower.response
@@ -163,14 +179,11 @@ def _overlap(one: Array, other: Array | None) -> float:
     return np.count_nonzero(one & other) / either if either else 0.0
 
 
-def colors_of(view: View) -> Array:
-    """The mean colour of each slice of somebody, from head to feet, as his gallery remembers it.
-
-    Returns:
-        ``(SLICES, 3)`` float RGB, 0 to 1; NaN where nothing of the slice shows.
-    """
+@lru_cache(maxsize=256)
+def known_view(view: View) -> KnownView:
+    """What is shown of a view, which never changes."""
     share = np.square(view.roots, dtype=np.float64).reshape(len(view.roots), -1)
     total = share.sum(axis=1, keepdims=True)
-    rgb = share @ palette()[:, ::-1] / np.where(total > 0, total, np.nan) / 255
-    colors: Array = rgb
-    return colors
+    rgb = (share @ palette()[:, ::-1] / np.where(total > 0, total, np.nan) / 255).tolist()
+    colors = tuple(None if r != r else (r, g, b) for r, g, b in rgb)
+    return KnownView(colors, view.top)
