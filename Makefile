@@ -5,7 +5,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Arguments for pytest, as in: make test PYTEST="-k replay"
+# Arguments for pytest, as in: make test PYTEST="-k replay"; in one process: PYTEST="-n 0"
 PYTEST ?=
 # Arguments for the injector, as in: make inject INJECT="--count 5000 --seed 7"
 INJECT ?= --count 1000
@@ -24,7 +24,7 @@ demo: $(VENV)/.installed ## simulate a recording, run both nodes over it, show t
 	$(BIN)/python -m rgbd_kcf_tracker.bench.demo demo --overwrite
 
 test: $(VENV)/.installed-test ## run the whole suite
-	$(BIN)/python -m pytest $(PYTEST)
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile $(PYTEST)
 
 inject: $(VENV)/.installed ## try faults of files, disks and signals on every command
 	$(BIN)/python -m rgbd_kcf_tracker.bench.inject $(INJECT)

@@ -88,7 +88,7 @@ class Follower:
         self._agreed = 0
         self._last_box, self._unseen = box, 0.0
         self._size_of_image = frame.width, frame.height
-        self._mobile = False
+        self._mobile = self._carried = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
         self.person: Person | None = None
@@ -217,6 +217,8 @@ class Follower:
     def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
         assert self._look is not None
         self._follow_size(frame)
+        if account is not None and account.scene.motion is not None:
+            self._carried = True
         look = self._look.step(frame, dt)
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
@@ -227,7 +229,7 @@ class Follower:
                 self._look.refuse()
                 look = None
         if look is not None:
-            self._last_box, self._unseen = look.box, 0.0
+            self._last_box, self._unseen, self._carried = look.box, 0.0, False
         else:
             self._unseen += dt
         if account is not None and self._unseen < NEWCOMER and self._agree(account, look):
@@ -262,7 +264,7 @@ class Follower:
 
     def _far(self, account: Account, box: Box) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it."""
-        if not account.settled or box.intersection(self._last_box) > 0:
+        if self._carried or not account.settled or box.intersection(self._last_box) > 0:
             return False
         depth = account.scene.view.depth[_part(account, box)]
         if np.count_nonzero(depth) < READ * depth.size:
