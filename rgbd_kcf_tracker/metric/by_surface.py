@@ -210,7 +210,7 @@ class BySurface:
                 if candidate is self.candidates[0]:
                     self.candidates.insert(0, self.candidates.pop())
                     break
-        best = self._alone(self.candidates) if self.candidates else None
+        best = self._alone(account, self.candidates) if self.candidates else None
         parameters = self._parameters
         if best is None or best.probability < (
             parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
@@ -218,14 +218,16 @@ class BySurface:
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
 
-    def _alone(self, candidates: list[Candidate]) -> Candidate:
+    def _alone(self, account: Account, candidates: list[Candidate]) -> Candidate:
         """The best candidate with its probability beside all others: the target is one of them."""
-        best = candidates[0]
+        best, *others = candidates
         apart = APART * self.body.width
         rivals: list[Candidate] = []
-        for other in candidates[1:]:
+        for other in others:
+            index = account.sight_of(other.seen)
             if all(
                 np.hypot(*(other.placed.position - each.placed.position)[[0, 2]]) > apart
+                and (index < 0 or index != account.sight_of(each.seen))
                 and not other.seen.meets(each.seen)
                 for each in (best, *rivals)
             ):

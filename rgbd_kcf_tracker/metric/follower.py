@@ -11,9 +11,10 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
-from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
     in_metres,
@@ -25,6 +26,7 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
 ATTEND = 1.0
@@ -47,6 +49,11 @@ NEWCOMER_AREA = 0.1
 """Square metres of him, at the least."""
 COVERED = 0.6
 """Share of a newcomer's outline that lies in the target's box, at the least."""
+MENDING, MORE = 2.0, 1.6
+"""Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
+it is a part of, and how much larger that is at the least."""
+TALL, TALLER = 0.9, 1.2
+"""Metres of height of an upright part of somebody, and of somebody."""
 READ = 0.5
 """Share of a box's middle that has depth from which depth tells what is there."""
 OUTLINED = 0.5
@@ -88,7 +95,7 @@ class Follower:
         self._agreed = 0
         self._last_box, self._unseen = box, 0.0
         self._size_of_image = frame.width, frame.height
-        self._mobile = self._carried = False
+        self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
         self.person: Person | None = None
@@ -101,7 +108,7 @@ class Follower:
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
-        belief = None if self._surface is None else self._surface.belief()
+        belief = self._belief()
         self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
@@ -148,6 +155,7 @@ class Follower:
         if self.person is None:
             self.person = self._crowd.chosen(account, seen)
         self._surface = BySurface(account, seen, self.person, self._parameters)
+        self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
 
     def _depth_of_surface(self) -> float | None:
         return float(self._surface.motion.position[2]) if self._surface is not None else None
@@ -176,11 +184,42 @@ class Follower:
                 surface.miss(account.scene, dt)
                 return self._tracked(frame, box, found.probability, found.seen.depth, belief)
             surface.resume(found)
+        whole = self._whole(account, found.seen)
+        if whole is not None:
+            self._start_over(account, whole)
+            box = outline_box(account.scene, whole)
+            return self._tracked(frame, box, found.probability, whole.depth, self._belief())
         box = surface.take(account.scene, found, dt)
         self.seen = found.seen
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
+
+    def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:
+        """All of somebody of whom something hid a part when he was chosen, as soon as it shows."""
+        if not self._partial or account.time - self._since > MENDING:
+            return None
+        index = account.sight_of(seen)
+        if index < 0:
+            return None
+        figure, owner = account.sights[index].figure, account.owner[index]
+        if figure.parted or figure.seen.area < MORE * seen.area:
+            return None
+        if not TALLER < figure.seen.height < HEIGHT[1] or figure.seen.width > WIDTH[1]:
+            return None
+        if owner >= 0 and account.people[owner] is not self.person:
+            return None
+        return figure.seen
+
+    def _start_over(self, account: Account, whole: Silhouette) -> None:
+        assert self.person is not None
+        self.person.gallery = Gallery()
+        self._surface = BySurface(account, whole, self.person, self._parameters)
+        self._partial = whole.cut.any
+        self.seen = whole
+
+    def _belief(self) -> Belief | None:
+        return None if self._surface is None else self._surface.belief()
 
     def _recognised(self, stranger: Person, time: float) -> bool:
         """Whether enough was seen of somebody to say for good that he is the target."""
