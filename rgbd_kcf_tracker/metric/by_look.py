@@ -111,7 +111,8 @@ class ByLook:
         self.response = sighting.ratio
         if sighting.ratio < self._parameters.seen_ratio:
             return None
-        return self._taken(frame, sighting, dt)
+        # Nothing bears out that this is the target: it is not learned from.
+        return self._taken(frame, sighting, dt, learn=False)
 
     def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
         """Learn from a target found by other means, but no more often than every ``interval``."""
@@ -186,13 +187,15 @@ class ByLook:
             ] = -np.inf
         return best
 
-    def _taken(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
+    def _taken(self, frame: Frame, sighting: Sighting, dt: float, learn: bool = True) -> Look:
         self._cx = float(np.clip(sighting.cx, 0, frame.width))
         self._cy = float(np.clip(sighting.cy, 0, frame.height))
         box = Box.from_center(self._cx, self._cy, *self._size)
         depth = depth_in(frame, box)
         self._rescale(frame, depth, sighting, dt)
         box = Box.from_center(self._cx, self._cy, *self._size)
+        if not learn:
+            return Look(box, sighting.ratio, depth)
         if sighting.ratio > LEARN_RATIO:
             self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
             rate = min(0.15, SCALE_RATE * dt * 30)

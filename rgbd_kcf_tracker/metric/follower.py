@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
@@ -54,6 +55,8 @@ MENDING, MORE = 2.0, 1.6
 it is a part of, and how much larger that is at the least."""
 TALL, TALLER = 0.9, 1.2
 """Metres of height of an upright part of somebody, and of somebody."""
+UNCHANGED, SAME_COLOR = 0.5, 16
+"""Share of a box's middle, and levels of its colours, from which it has not changed."""
 READ = 0.5
 """Share of a box's middle that has depth from which depth tells what is there."""
 OUTLINED = 0.5
@@ -98,6 +101,7 @@ class Follower:
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
+        self._last: tuple[Scene, Silhouette] | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         self.response: float | None = None
@@ -134,6 +138,8 @@ class Follower:
         """
         self._account = account
         self.seen = None
+        if account is not None and account.scene.motion is not None:
+            self._last = None
         if self._look is not None:
             self._look.response = None
         if self._surface is None:
@@ -190,7 +196,7 @@ class Follower:
             box = outline_box(account.scene, whole)
             return self._tracked(frame, box, found.probability, whole.depth, self._belief())
         box = surface.take(account.scene, found, dt)
-        self.seen = found.seen
+        self.seen, self._last = found.seen, (account.scene, found.seen)
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
@@ -243,13 +249,27 @@ class Follower:
             blind = scene is None or surface.without_depth(scene) > BLIND
             if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
-                if look is not None:
+                if look is not None and not self._unchanged(scene, look.box):
                     surface.seen_elsewhere(view, look.box)
                     return self._tracked(
                         frame, look.box, _score(look), look.depth, surface.belief()
                     )
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
+
+    def _unchanged(self, scene: Scene | None, box: Box) -> bool:
+        """Whether a box shows what was there when the target was last seen, elsewhere."""
+        if scene is None or self._last is None:
+            return False
+        then, seen = self._last
+        part = _part(scene, box)
+        elsewhere = np.ones(scene.view.shape, np.bool_)
+        elsewhere[seen.rows, seen.cols] = False
+        elsewhere = elsewhere[part]
+        if np.count_nonzero(elsewhere) <= UNCHANGED * elsewhere.size:
+            return False
+        change = cv2.absdiff(scene.image[part], then.image[part]).max(axis=2)[elsewhere]
+        return float(np.mean(change < SAME_COLOR)) > UNCHANGED
 
     # -- by look ----------------------------------------------------------------------------------
 
@@ -294,7 +314,7 @@ class Follower:
 
     def _taken(self, account: Account, box: Box) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""
-        pixels = account.parts.kinds[_part(account, box)]
+        pixels = account.parts.kinds[_part(account.scene, box)]
         index = account.sight_among(account.parts.counted(pixels.ravel()))
         if index < 0 or account.owner[index] < 0:
             return False
@@ -305,7 +325,7 @@ class Follower:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it."""
         if self._carried or not account.settled or box.intersection(self._last_box) > 0:
             return False
-        depth = account.scene.view.depth[_part(account, box)]
+        depth = account.scene.view.depth[_part(account.scene, box)]
         if np.count_nonzero(depth) < READ * depth.size:
             return False
         outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
@@ -382,10 +402,10 @@ def _score(look: Look) -> float:
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
 
 
-def _part(account: Account, box: Box) -> tuple[slice, slice]:
+def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
-    rows, cols = account.scene.view.shape
-    middle, step = box.scaled(0.6), account.scene.view.step
+    rows, cols = scene.view.shape
+    middle, step = box.scaled(0.6), scene.view.step
     x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
     y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
     return slice(y0, y1), slice(x0, x1)
@@ -393,12 +413,12 @@ def _part(account: Account, box: Box) -> tuple[slice, slice]:
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:
     """Numbers of all of whom something shows in a box: the target may be any of them."""
-    kinds = np.unique(account.parts.kinds[_part(account, box)])
+    kinds = np.unique(account.parts.kinds[_part(account.scene, box)])
     owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
     return frozenset(account.people[owner].number for owner in owners if owner >= 0)
 
 
 def _room_share(account: Account, box: Box) -> float:
     """Share of the middle of a box that shows the room."""
-    part = account.scene.still[_part(account, box)]
+    part = account.scene.still[_part(account.scene, box)]
     return float(part.mean()) if part.size else 0.0

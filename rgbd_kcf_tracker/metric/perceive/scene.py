@@ -39,7 +39,8 @@ class Scene:
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
-        codes: ``(h, w)`` int32 colour codes, in the light of the first frame.
+        image: ``(h, w, 3)`` BGR, in the light of the first frame.
+        codes: ``(h, w)`` int32, its colour codes.
         motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
             where it has moved and nothing tells how.
     """
@@ -53,6 +54,7 @@ class Scene:
     still: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
+    image: npt.NDArray[np.uint8]
     codes: npt.NDArray[np.int32]
     motion: Pose | Lost | None
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
@@ -152,7 +154,7 @@ class SceneReader:
                 somebody = None
             self.room.update(view.depth, seconds, somebody, surfaces)
         before = self.room.before
-        codes = color_codes(self._light.steadied(image, ~before))
+        image = self._light.steadied(image, ~before)
         return Scene(
             view,
             floor,
@@ -163,7 +165,8 @@ class SceneReader:
             self.room.still,
             surfaces,
             self._rim,
-            codes,
+            image,
+            color_codes(image),
             motion,
         )
 
