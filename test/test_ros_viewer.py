@@ -373,6 +373,28 @@ def test_views_have_the_pictures_that_they_are_of_or_none() -> None:
     page = fresh
     assert moment(2, 1) == [True]
     # An image from long after a view came up is no picture of it.
-    page.answer(3, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
-    page.evidence(3, looks(2))
+    page.answer(7, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
+    page.evidence(7, looks(2))
     assert moment(10**10, 2) == [True, False]
+
+
+def test_the_first_sight_is_shown_of_a_tracker_that_keeps_no_views() -> None:
+    page = LivePage('tracker', 10)
+
+    def moment(stamp: int) -> bytes | None:
+        page.answer(stamp, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=1)])
+        page.evidence(stamp, {1: TargetEvidence(Insight(response=0.5))})
+        picture = frame_at(stamp)
+        picture.color[:] = stamp % 251
+        page.image(picture, stamp)
+        blob = page.board.take((-1, 0))[3].get('view_1_0')
+        return None if blob is None else bytes(blob)
+
+    assert moment(10**9) is None  # it was there before us
+    page.answer(2 * 10**9, [])
+    first = moment(3 * 10**9)
+    assert first is not None
+    assert moment(5 * 10**9 + 100) == first
+    # The tracker was started anew: its target 1 is somebody else.
+    page.answer(6 * 10**9, [])
+    assert moment(7 * 10**9 + 50) not in (None, first)
