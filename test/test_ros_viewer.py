@@ -217,6 +217,12 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         assert page.value('page.shown.targets[0].ellipse.length') == 6
         confused = page.value('page.entries.map(e => e.targets[0] ? e.targets[0][3] : 0)')
         assert all(0 <= share <= 1 for share in confused)
+        # No pictures any more: the page says so, until they come again.
+        page.until("document.getElementById('banner').innerText.includes('No picture for')")
+        assert page.value("document.getElementById('state').innerText") == 'waiting'
+        play_hidden(rig, range(at + 20, at + 23))
+        page.until("document.getElementById('banner').hidden")
+        assert page.value("document.getElementById('state').innerText") != 'waiting'
         assert page.errors == []
         page.open('about:blank')
         rig.wait(lambda: not node._outputs.wanted('evidence'))
@@ -233,6 +239,19 @@ def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:
             until(rig, lambda: len(look.headers) > 2)
         before = len(rig.boxes)
         until(rig, lambda: len(rig.boxes) > before + 3)
+
+
+def test_a_silent_tracker_is_said_and_its_last_box_taken_away(rig: Rig) -> None:
+    with running_viewer() as (_, server):
+        look = Look(server)
+        with running_node(rig, init_box='140,90,36,60'):
+            until(rig, lambda: look.headers and look.headers[-1]['targets'])
+            assert not look.headers[-1]['silent']
+        until(rig, lambda: look.headers[-1]['silent'])
+        assert look.headers[-1]['targets'] == []
+        with running_node(rig, init_box='140,90,36,60'):
+            until(rig, lambda: look.headers[-1]['targets'])
+        look.close()
 
 
 def test_executable_says_where_the_page_is_and_needs_a_token_elsewhere() -> None:

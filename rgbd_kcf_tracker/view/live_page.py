@@ -37,6 +37,8 @@ STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
 """What an answer takes its time for, as the node's diagnostics tell, each a median."""
 EXPECTED_S = 1.0
 """Seconds after the last message for which the next of its kind is waited for."""
+SILENT_S = 2.0
+"""Seconds after the last answer from which a tracker is silent, and what it said is old."""
 NEW_NS = 500_000_000
 """Nanoseconds after which an image no longer shows what a view was taken from."""
 _ANSWERS = 64
@@ -143,6 +145,7 @@ class LivePage:
             'title': self._title,
             'live': True,
             'frames': 0,
+            'period': self._period,
             'variants': describe_variants(),
             'several': True,
             'stages': STAGES,
@@ -300,7 +303,8 @@ class LivePage:
         self._frame = frame
         if self._pending is not None and self._pending[0] <= stamp_ns:
             self._settle()
-        answer = self._answers.get(stamp_ns, self._latest())
+        silent = time.monotonic() - self._answered_at > SILENT_S
+        answer = _Answer({}) if silent else self._answers.get(stamp_ns, self._latest())
         evidence = answer.evidence or {}
         tracks = {
             number: dataclasses.replace(
@@ -310,7 +314,7 @@ class LivePage:
             else track
             for number, track in answer.tracks.items()
         }
-        if stamp_ns in self._answers:
+        if stamp_ns in self._answers and not silent:
             self._remember(frame, stamp_ns, answer)
         chosen = frozenset(number for number in tracks if self._asked_for(number, answer))
         names = {
@@ -323,6 +327,7 @@ class LivePage:
         status = {
             'time': round((stamp_ns - origin) * 1e-9, 3),
             'playing': True,
+            'silent': silent,
             'everyone': self.everyone,
             'busy': '',
             'word': self._word if time.monotonic() - self._said < 1.0 else '',
