@@ -9,6 +9,7 @@ The one place outside the engines that knows their inside: page, pictures and th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -37,6 +38,8 @@ ONE_THING = 0.8
 """Overlap from which two silhouettes that were weighed are one thing, which was cut in two ways."""
 ONE_BOX = 0.98
 """Likewise of the boxes that they would have given."""
+LEAST_LOSS = -0.001
+"""Log-odds lost to other candidates; less is what rounding leaves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,7 +158,11 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
         ):
             continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
-        considered.append(Considered(box, float(candidate.probability), cues, mask))
+        chance = float(candidate.probability)
+        alone = min(max(float(share.sum()), -evidence.SUREST), evidence.SUREST)
+        beside = math.log(chance / (1 - chance)) - alone
+        cues[evidence.OTHER_PLACES] = beside if beside < LEAST_LOSS else 0.0
+        considered.append(Considered(box, chance, cues, mask))
     cloud = surface._cloud if surface is not None else None
     half = surface.body.height / 2 if surface is not None else 0.0
     floor = scene.floor

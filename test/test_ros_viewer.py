@@ -217,6 +217,12 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         assert page.value('page.shown.targets[0].ellipse.length') == 6
         confused = page.value('page.entries.map(e => e.targets[0] ? e.targets[0][3] : 0)')
         assert all(0 <= share <= 1 for share in confused)
+        # No pictures any more: the page says so, until they come again.
+        page.until("document.getElementById('banner').innerText.includes('No picture for')")
+        assert page.value("document.getElementById('state').innerText") == 'waiting'
+        play_hidden(rig, range(at + 20, at + 23))
+        page.until("document.getElementById('banner').hidden")
+        assert page.value("document.getElementById('state').innerText") != 'waiting'
         assert page.errors == []
         page.open('about:blank')
         rig.wait(lambda: not node._outputs.wanted('evidence'))
@@ -233,6 +239,19 @@ def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:
             until(rig, lambda: len(look.headers) > 2)
         before = len(rig.boxes)
         until(rig, lambda: len(rig.boxes) > before + 3)
+
+
+def test_a_silent_tracker_is_said_and_its_last_box_taken_away(rig: Rig) -> None:
+    with running_viewer() as (_, server):
+        look = Look(server)
+        with running_node(rig, init_box='140,90,36,60'):
+            until(rig, lambda: look.headers and look.headers[-1]['targets'])
+            assert not look.headers[-1]['silent']
+        until(rig, lambda: look.headers[-1]['silent'])
+        assert look.headers[-1]['targets'] == []
+        with running_node(rig, init_box='140,90,36,60'):
+            until(rig, lambda: look.headers[-1]['targets'])
+        look.close()
 
 
 def test_executable_says_where_the_page_is_and_needs_a_token_elsewhere() -> None:
@@ -373,6 +392,28 @@ def test_views_have_the_pictures_that_they_are_of_or_none() -> None:
     page = fresh
     assert moment(2, 1) == [True]
     # An image from long after a view came up is no picture of it.
-    page.answer(3, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
-    page.evidence(3, looks(2))
+    page.answer(7, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=3)])
+    page.evidence(7, looks(2))
     assert moment(10**10, 2) == [True, False]
+
+
+def test_the_first_sight_is_shown_of_a_tracker_that_keeps_no_views() -> None:
+    page = LivePage('tracker', 10)
+
+    def moment(stamp: int) -> bytes | None:
+        page.answer(stamp, [Track(Box(10, 10, 20, 40), TrackState.TRACKING, 0.9, id=1)])
+        page.evidence(stamp, {1: TargetEvidence(Insight(response=0.5))})
+        picture = frame_at(stamp)
+        picture.color[:] = stamp % 251
+        page.image(picture, stamp)
+        blob = page.board.take((-1, 0))[3].get('view_1_0')
+        return None if blob is None else bytes(blob)
+
+    assert moment(10**9) is None  # it was there before us
+    page.answer(2 * 10**9, [])
+    first = moment(3 * 10**9)
+    assert first is not None
+    assert moment(5 * 10**9 + 100) == first
+    # The tracker was started anew: its target 1 is somebody else.
+    page.answer(6 * 10**9, [])
+    assert moment(7 * 10**9 + 50) not in (None, first)

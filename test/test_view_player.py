@@ -24,6 +24,7 @@ from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState, create_t
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.insight import Insight, insight_of
+from rgbd_kcf_tracker.metric.decide.evidence import OTHER_PLACES, SUREST
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
@@ -142,6 +143,28 @@ def test_candidates_particles_and_ellipse_are_those_of_the_tracker() -> None:
     spread = np.reshape(hidden[2].covariance, (3, 3))[::2, ::2]
     mean = np.array(hidden[2].predicted)[::2]
     assert target['ellipse'][:5] == ellipse_of(mean, spread)
+
+
+def test_cues_add_up_to_the_verdict_also_beside_others() -> None:
+    """What the likeliest loses to candidates elsewhere was in the score and not among the cues."""
+    scene = SimulatedRecording('crowd', 4, 10.0, (480, 270), 10.0)
+    start, box = first_box(scene, None)
+    tracker = create_tracker('metric')
+    frames = scene.frames(start)
+    tracker.start(next(frames), box)
+    lost = 0
+    for frame in frames:
+        track = tracker.update(frame)
+        considered = insight_of(tracker).considered
+        for one in considered:
+            odds = min(max(sum(one.cues.values()), -SUREST), SUREST)
+            assert 1 / (1 + np.exp(-odds)) == pytest.approx(one.probability, abs=1e-3)
+        assert all(one.cues[OTHER_PLACES] == 0 for one in considered[1:])
+        if considered and considered[0].cues[OTHER_PLACES]:
+            lost += 1
+            if track.box is not None:
+                assert considered[0].probability == track.score
+    assert lost
 
 
 def test_stepping_goes_both_ways() -> None:

@@ -31,8 +31,7 @@ EVERY = 3
 """Tracked at 15 Hz, shown at 5: a third of the bytes."""
 COLORS = 64
 LINE = 2
-"""Pixels by which the box is drawn larger: so small a picture has its line about the target, not on
-it."""
+"""Pixels by which the box is drawn larger: in so small a picture the line would hide the target."""
 
 Picture = npt.NDArray[np.uint8]
 

@@ -210,9 +210,11 @@ class BySurface:
                 if candidate is self.candidates[0]:
                     self.candidates.insert(0, self.candidates.pop())
                     break
-        best = self._alone(account, self.candidates) if self.candidates else None
+        if not self.candidates:
+            return None
+        best = self.candidates[0] = self._alone(account, self.candidates)
         parameters = self._parameters
-        if best is None or best.probability < (
+        if best.probability < (
             parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
         ):
             return None

@@ -37,6 +37,8 @@ STAGES = ('transport', 'waiting', 'decode', 'track', 'publish')
 """What an answer takes its time for, as the node's diagnostics tell, each a median."""
 EXPECTED_S = 1.0
 """Seconds after the last message for which the next of its kind is waited for."""
+SILENT_S = 2.0
+"""Seconds after the last answer from which a tracker is silent, and what it said is old."""
 NEW_NS = 500_000_000
 """Nanoseconds after which an image no longer shows what a view was taken from."""
 _ANSWERS = 64
@@ -85,12 +87,14 @@ class _Looks:
     """What is remembered of how one looks.
 
     Attributes:
-        since_ns: stamp of the first answer that told of it; None where it was there before us.
+        since_ns: stamp from which answers tell of it; None where it was there before us.
+        told: whether evidence has told of it.
         born: stamps from which views are known, None of those that were there before us.
         known: the views with their pictures.
     """
 
-    since_ns: int | None
+    since_ns: int | None = None
+    told: bool = False
     born: dict[KnownView, int | None] = field(default_factory=dict)
     known: tuple[Known, ...] = ()
 
@@ -141,6 +145,7 @@ class LivePage:
             'title': self._title,
             'live': True,
             'frames': 0,
+            'period': self._period,
             'variants': describe_variants(),
             'several': True,
             'stages': STAGES,
@@ -213,6 +218,7 @@ class LivePage:
     def answer(self, stamp_ns: int, tracks: Sequence[Track]) -> None:
         """``~/state``: the answer to a frame, the chosen target first."""
         self._settle()
+        before = self._latest().tracks
         found = {track.id: track for track in tracks if track.state is not TrackState.IDLE}
         self._answers[stamp_ns] = _Answer(found)
         while len(self._answers) > _ANSWERS:
@@ -220,8 +226,11 @@ class LivePage:
         now = time.monotonic()
         listened, self._answered_at = now - self._answered_at < EXPECTED_S, now
         for number in found:
-            self._looks.setdefault(number, _Looks(stamp_ns if listened else None))
+            looks = self._looks.setdefault(number, _Looks())
             self._looks.move_to_end(number)
+            if number not in before:  # or back, or of a tracker that was started anew
+                looks.since_ns = stamp_ns if listened else None
+                looks.known = tuple(known for known in looks.known if known.view is not None)
         while len(self._looks) > _MOST_PEOPLE:
             self._looks.popitem(last=False)
         if self._origin_ns is None or stamp_ns < self._origin_ns:
@@ -250,7 +259,8 @@ class LivePage:
             if looks is None:
                 continue
             new = looks.since_ns is not None and stamp_ns - looks.since_ns < NEW_NS
-            born = stamp_ns if new or (listened and looks.born) else None
+            born = stamp_ns if new or (listened and looks.told) else None
+            looks.told = True
             looks.born = {view: looks.born.get(view, born) for view in told.insight.gallery}
         answer = self._answers.get(stamp_ns)
         if answer is None:
@@ -293,7 +303,8 @@ class LivePage:
         self._frame = frame
         if self._pending is not None and self._pending[0] <= stamp_ns:
             self._settle()
-        answer = self._answers.get(stamp_ns, self._latest())
+        silent = time.monotonic() - self._answered_at > SILENT_S
+        answer = _Answer({}) if silent else self._answers.get(stamp_ns, self._latest())
         evidence = answer.evidence or {}
         tracks = {
             number: dataclasses.replace(
@@ -303,7 +314,7 @@ class LivePage:
             else track
             for number, track in answer.tracks.items()
         }
-        if stamp_ns in self._answers:
+        if stamp_ns in self._answers and not silent:
             self._remember(frame, stamp_ns, answer)
         chosen = frozenset(number for number in tracks if self._asked_for(number, answer))
         names = {
@@ -316,6 +327,7 @@ class LivePage:
         status = {
             'time': round((stamp_ns - origin) * 1e-9, 3),
             'playing': True,
+            'silent': silent,
             'everyone': self.everyone,
             'busy': '',
             'word': self._word if time.monotonic() - self._said < 1.0 else '',

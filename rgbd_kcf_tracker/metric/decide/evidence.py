@@ -107,6 +107,9 @@ WEIGHTS = np.array(
     )
 )  # fmt: skip
 
+SUREST = 30.0
+"""Log-odds beyond which nothing is surer."""
+
 CUES = (
     ('place', (0, 1, 2)),
     ('look', (12, 13)),
@@ -122,6 +125,9 @@ CUES = (
 )
 """What the regression's inputs are about, by their places in it."""
 
+OTHER_PLACES = 'other places'
+"""What the likeliest candidate loses to the others; the regression does not know of them."""
+
 CUE_WORDS = {
     'place': 'how far it is from where the target was expected',
     'look': 'how alike its colours are to those that the target is known by',
@@ -134,11 +140,12 @@ CUE_WORDS = {
     'left the image': 'the target left at the edge of the image, but this did not come in there',
     'came from behind': 'it was first seen away from the image edge, so it was here before',
     'to begin with': 'where all other cues say nothing',
+    OTHER_PLACES: 'the target is at one place only: what the likeliest loses to the others',
 }
-"""What each of :data:`CUES` says."""
+"""What each of :data:`CUES`, and :data:`OTHER_PLACES`, says."""
 
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
-    logit = min(max(float(WEIGHTS @ evidence.features()), -30.0), 30.0)
+    logit = min(max(float(WEIGHTS @ evidence.features()), -SUREST), SUREST)
     return float(1.0 / (1.0 + np.exp(-logit)))

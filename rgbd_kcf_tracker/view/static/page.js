@@ -9,7 +9,7 @@ const STATE_WORDS = {tracking: 'tracking', occluded: 'hidden', lost: 'lost', idl
 const stored = $('stored');
 const page = {
   hello: null, shown: null, entries: [], trails: new Map(), points: null, bitmaps: {}, drag: null,
-  socket: null, wait: 500, views: new Map(), names: new Map(), why: 0, settings: '', timeAxis: null, drawn: 0, word: 0, moment: 0,
+  socket: null, wait: 500, views: new Map(), names: new Map(), why: 0, settings: '', timeAxis: null, drawn: 0, word: 0, moment: 0, last: 0, waiting: false,
 };
 const room = new Room($('room'), $('labels'), stored ? null : (x, y) => send({do: 'point', x, y, frame: currentFrame()}));
 
@@ -50,6 +50,8 @@ async function show(buffer) {
   const last = page.entries.length ? page.entries[page.entries.length - 1].t : 0;
   page.entries = page.entries.filter(e => e.t >= last - 60);
   page.shown = shown;
+  page.last = performance.now();
+  if (page.waiting) { page.waiting = false; $('banner').hidden = true; }
   showViews(shown, blob);
   redraw();
   page.drawn += 1;
@@ -97,6 +99,10 @@ function showWords(shown) {
   $('state').dataset.state = worst;
   const some = chosen.length > 1 ? `${states.filter(s => s === worst).length} of ${states.length} ` : '';
   $('state').textContent = some + STATE_WORDS[worst] + (others ? `, ${others} ${others === 1 ? 'other' : 'others'}` : '');
+  if (shown.silent) {
+    $('state').dataset.state = 'idle';
+    $('state').textContent = 'tracker silent';
+  }
   const recent = page.entries.slice(-30);
   const mean = name => recent.reduce((sum, e) => sum + (e[name] || 0), 0) / Math.max(1, recent.length);
   const facts = [];
@@ -333,6 +339,8 @@ function greet(hello) {
   $('kind').textContent = stored ? 'a recorded run' : hello.live ? 'live' : 'recording';
   $('transport').hidden = hello.live;
   $('variant').replaceChildren(...hello.variants.map(v => make('option', '', v.name)));
+  $('variant').value = '';
+  page.last = performance.now();
   $('variant').disabled = Boolean(stored);
   showLegend(hello.stages);
   page.settings = '';
@@ -445,6 +453,20 @@ function connect() {
   });
 }
 
+/** Say so where a live page gets no pictures: what it shows is old, or nothing. */
+function watchForPictures() {
+  setInterval(() => {
+    const open = page.socket && page.socket.readyState === WebSocket.OPEN;
+    if (!page.hello || !page.hello.live || !open || document.hidden) return;
+    const seconds = (performance.now() - page.last) / 1000;
+    if (seconds < 3 + 2 * page.hello.period) return;
+    page.waiting = true;
+    $('state').dataset.state = 'idle';
+    $('state').textContent = 'waiting';
+    say(`No picture for ${Math.round(seconds)} s: is the camera running, and the viewer's color/image remapped to it?`);
+  }, 1000);
+}
+
 // --- out of a file --------------------------------------------------------------------------------
 
 function replay() {
@@ -507,4 +529,5 @@ if (stored) {
   $('defaults').addEventListener('click', () => send({do: 'defaults'}));
   $('everyone').addEventListener('change', () => send({do: 'everyone', value: $('everyone').checked}));
   connect();
+  watchForPictures();
 }
