@@ -29,9 +29,10 @@ _STEPS = 32
 
 _LOG = np.rint(_STEPS * np.log((np.arange(256) + DARKEST) / DARKEST)).astype(np.uint8)
 _TOP = int(_LOG[-1])
-_LEVEL = (np.arange(_TOP + 1) * LIGHTNESS // (_TOP + 1)).astype(np.int32) * (TINTS * TINTS)
+# Tables of 256, of which those of a tint begin at the largest negative difference.
+_LEVEL = (np.arange(256) * LIGHTNESS // (_TOP + 1)).astype(np.int32) * (TINTS * TINTS)
 _TINT = np.minimum(
-    TINTS / 2 * (1 + np.tanh(np.arange(-_TOP, _TOP + 1) * (STEEPNESS / _STEPS))), TINTS - 1
+    TINTS / 2 * (1 + np.tanh((np.arange(256) - _TOP) * (STEEPNESS / _STEPS))), TINTS - 1
 ).astype(np.int32)
 _TINT_OF_RED = _TINT * TINTS
 
@@ -72,10 +73,10 @@ def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
     """
     logs = cv2.LUT(image, _LOG)
     blue, green, red = cv2.split(logs)
-    codes: npt.NDArray[np.int32] = _LEVEL[cv2.transform(logs, _LUMA)]
-    offset = _TOP - green.astype(np.int16)
-    codes += _TINT_OF_RED[red + offset]
-    codes += _TINT[blue + offset]
+    codes: npt.NDArray[np.int32] = cv2.LUT(cv2.transform(logs, _LUMA), _LEVEL)
+    offset = _TOP - green  # may wrap, as its sums with the others then do: they lie in 0 to 2 _TOP
+    codes += cv2.LUT(red + offset, _TINT_OF_RED)
+    codes += cv2.LUT(blue + offset, _TINT)
     return codes
 
 
