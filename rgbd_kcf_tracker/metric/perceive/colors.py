@@ -27,6 +27,7 @@ STEEPNESS = 3.0
 _STEPS = 32
 """Steps of the logarithm for each factor of e: finer than the levels by far."""
 
+_PIXEL = np.dtype('V3')
 _LOG = np.rint(_STEPS * np.log((np.arange(256) + DARKEST) / DARKEST)).astype(np.uint8)
 _TOP = int(_LOG[-1])
 # Tables of 256, of which those of a tint begin at the largest negative difference.
@@ -62,8 +63,10 @@ def view_image(
     Returns:
         ``shape + (3,)`` uint8.
     """
-    half = step // 2
-    return np.ascontiguousarray(color[half::step, half::step][: shape[0], : shape[1]])
+    half, (rows, cols) = step // 2, shape
+    # Pixels as items of three bytes are copied twice as fast as byte by byte.
+    pixels = np.ascontiguousarray(color).view(_PIXEL)[half::step, half::step, 0][:rows, :cols]
+    return np.ascontiguousarray(pixels).view(np.uint8).reshape(rows, cols, 3)
 
 
 def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
