@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
+from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
@@ -186,13 +188,18 @@ class BySurface:
         missing = self._should_be_seen(scene) > 0.6
         others = account.others(self._person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
+        free = [seen for seen in found if others.share(seen) < STANDING]
         figures = [
             sight.figure.seen
-            for sight in account.sights
-            if sight.figure.seen.area < MOST_SHARE * self.body.area
+            for kind, sight in enumerate(account.sights, FIRST)
+            if not others.theirs[kind]
         ]
-        found += [seen for seen in figures if not any(seen.same(other) for other in found)]
-        free = [s for s in found if others.share(s) < STANDING]
+        free += [
+            seen
+            for seen in figures
+            if seen.area < MOST_SHARE * self.body.area
+            and not any(seen.same(other) for other in free)
+        ]
         self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
         self.candidates = [
             c
@@ -200,18 +207,14 @@ class BySurface:
             if c.evidence.room < STANDING and c.evidence.behind < SOMEBODY_ELSE
         ]
         self.candidates.sort(key=lambda c: -c.probability)
-        for candidate in self.candidates[:2]:
-            whole = gathered(scene, self.body, candidate.seen, candidate.placed, others)
-            if whole is None:
-                continue
-            more = self._weighed(account, whole, dt, missing)
-            if _logit(more.probability) > _logit(candidate.probability) - 1.0:
-                self.candidates.append(more)
-                if candidate is self.candidates[0]:
-                    self.candidates.insert(0, self.candidates.pop())
-                    break
         if not self.candidates:
             return None
+        first = self.candidates[0]
+        whole = gathered(scene, self.body, first.seen, first.placed, others)
+        if whole is not None:
+            more = self._weighed(account, whole, dt, missing)
+            if _logit(more.probability) > _logit(first.probability) - 1.0:
+                self.candidates.insert(0, more)
         best = self.candidates[0] = self._alone(account, self.candidates)
         parameters = self._parameters
         if best.probability < (
@@ -228,7 +231,7 @@ class BySurface:
         for other in others:
             index = account.sight_of(other.seen)
             if all(
-                np.hypot(*(other.placed.position - each.placed.position)[[0, 2]]) > apart
+                math.dist(other.placed.floor, each.placed.floor) > apart
                 and (index < 0 or index != account.sight_of(each.seen))
                 and not other.seen.meets(each.seen)
                 for each in (best, *rivals)

@@ -10,6 +10,7 @@ them again); so the probability is calibrated, and the decision needs no thresho
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,23 +67,23 @@ class Evidence:
 
     def features(self) -> npt.NDArray[np.float64]:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
-        near = float(np.exp(-self.gone / FADE))
-        away = 1.0 - float(np.exp(-self.gone / AWAY))
+        near = math.exp(-self.gone / FADE)
+        away = 1.0 - math.exp(-self.gone / AWAY)
         look = min(max(self.look, -6.0), 5.0)
         mine = min(max(self.mine, -6.0), 8.0)
         behind = min(self.behind, 8.0)
-        log_fraction = float(np.log(max(self.fraction, 1e-3)))
+        log_fraction = math.log(max(self.fraction, 1e-3))
         less, more = min(max(-log_fraction, 0.0), 2.5), min(max(log_fraction, 0.0), 1.5)
         return np.array(
             (
-                np.log1p(self.step) * near,
-                np.log1p(self.stride) * near,
+                math.log1p(self.step) * near,
+                math.log1p(self.stride) * near,
                 min(self.step, 20.0) * near,
                 more**2,
                 less,
                 max(self.height, -8.0),
                 away,
-                np.log1p(self.gone),
+                math.log1p(self.gone),
                 away * less,
                 float(self.missing),
                 away * self.inland,
@@ -148,4 +149,4 @@ CUE_WORDS = {
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
     logit = min(max(float(WEIGHTS @ evidence.features()), -SUREST), SUREST)
-    return float(1.0 / (1.0 + np.exp(-logit)))
+    return 1.0 / (1.0 + math.exp(-logit))

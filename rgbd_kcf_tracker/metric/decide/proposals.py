@@ -63,14 +63,11 @@ def propose(
     """
     sizes = scene.sizes
     z = scene.surfaces.depth
-    away = np.stack(
-        (
-            np.abs(sizes.x - expected.position[0]) / (expected.reach[0] + body.width),
-            np.abs(sizes.y - expected.position[1] - body.height / 2)
-            / (expected.reach[1] + body.height / 2),
-            np.abs(z - expected.position[2]) / (expected.reach[2] + 0.15),
-        )
-    ).max(axis=0)
+    across = np.abs(sizes.x - expected.position[0]) / (expected.reach[0] + body.width)
+    down = np.abs(sizes.y - expected.position[1] - body.height / 2)
+    down /= expected.reach[1] + body.height / 2
+    ahead = np.abs(z - expected.position[2]) / (expected.reach[2] + 0.15)
+    away = np.maximum(np.maximum(across, down), ahead)
     possible = (scene.surfaces.pixels >= LEAST_PIXELS) & (away < 1)
     possible &= (sizes.area > LEAST_SHARE * body.area) & (sizes.area < MOST_SHARE * body.area)
     possible[0] = False

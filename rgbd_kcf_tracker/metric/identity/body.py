@@ -57,6 +57,12 @@ class Placed:
     sigma: FloatArray
     fraction: float
 
+    @property
+    def floor(self) -> tuple[float, float]:
+        """The place on the floor: metres across and ahead."""
+        x, _, z = self.position.tolist()
+        return x, z
+
 
 class Body:
     """Size and colours of the target.

@@ -12,6 +12,7 @@ coefficient, at the shift of lightness that fits best: the same shirt is brighte
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -204,10 +205,10 @@ def look_log_odds(alike: float, area: float, views: int = 1) -> float:
             whichever is less.
         views: how many views of his it was compared with.
     """
-    raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * np.log2(views))
+    raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * math.log2(views))
     share = 0.4 + 0.6 * min(1.0, area / WHOLE_AREA)
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
-    return float(min(max(raw, least), SUREST_SAME)) * share
+    return min(max(raw, least), SUREST_SAME) * share
 
 
 def height_log_odds(top: float | None, known: float | None) -> float:
@@ -215,11 +216,11 @@ def height_log_odds(top: float | None, known: float | None) -> float:
     if top is None or known is None:
         return 0.0
     same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) / ANY_HEIGHT + STOOPED
-    return float(np.log(same))
+    return math.log(same)
 
 
 def _normal(x: float, sigma: float) -> float:
-    return float(np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi)))
+    return math.exp(-0.5 * (x / sigma) ** 2) / (sigma * math.sqrt(2 * math.pi))
 
 
 def same_person(first: View, second: View) -> float:

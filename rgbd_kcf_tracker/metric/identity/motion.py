@@ -54,11 +54,11 @@ class MotionFilter:
 
     def predict(self, dt: float, noise: float = 1.0) -> None:
         """Move on by ``dt`` seconds, with ``noise`` times the acceleration."""
-        q = self._noise * noise**2
+        q = self._noise * (noise**2 * dt**2)
         self.position = self.position + self.velocity * dt
-        self._p00 = self._p00 + 2 * dt * self._p01 + dt * dt * self._p11 + q * dt**4 / 4
-        self._p01 = self._p01 + dt * self._p11 + q * dt**3 / 2
-        self._p11 = self._p11 + q * dt**2
+        self._p00 = self._p00 + (2 * dt) * self._p01 + (dt * dt) * self._p11 + q * (dt**2 / 4)
+        self._p01 = self._p01 + dt * self._p11 + q * (dt / 2)
+        self._p11 = self._p11 + q
 
     def carried(self, motion: Pose) -> None:
         """Keep the place in the world: ``motion`` is the last camera's pose in that of now."""

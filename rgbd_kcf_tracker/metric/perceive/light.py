@@ -9,6 +9,8 @@ channel for itself (von Kries), is what has happened to all.
 
 from __future__ import annotations
 
+from functools import reduce
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -51,8 +53,8 @@ class Light:
         if self._first is None or self._first.shape != small.shape:
             self._first = small * self.gain.astype(np.float32)
         else:
-            low = np.minimum(small, self._first).min(axis=2)
-            high = np.maximum(small, self._first).max(axis=2)
+            low = reduce(cv2.min, cv2.split(cv2.min(small, self._first)))
+            high = reduce(cv2.max, cv2.split(cv2.max(small, self._first)))
             usable = (low > DARKEST) & (high < BRIGHTEST) & still[::STRIDE, ::STRIDE]
             if np.count_nonzero(usable) >= LEAST_PIXELS:
                 gain = np.median(self._first[usable] / small[usable], axis=0)
