@@ -53,9 +53,9 @@ THING_SIGMA = 0.25
 """The deviation of the height of another such body, as a share of what was seen."""
 NEAREST, NUDGE = 0.05, 1e-4
 """Metres ahead from which a lens can be taken out, and the slope over which its effect is taken."""
-LASTING = np.array([0.025, 0.048, 0.029])
+LASTING = np.array([0.023, 0.044, 0.027])
 """Metres of the errors that stay: across, down, ahead."""
-FRESH = np.array([0.02, 0.02, 0.015])
+FRESH = np.array([0.0185, 0.0185, 0.014])
 """Metres of the errors that are new after :data:`FRESH_TIME`."""
 FRESH_TIME = 0.1
 """Seconds in which limbs move the outline anew: frames that come faster say no more."""
