@@ -25,8 +25,6 @@ PENALTY = 5.0
 PENALTY_GROWTH = 3.0
 PENALTY_MAX = 20.0
 SPARSITY = 0.01
-BLOCK = 12
-"""Channels that are solved for at once: as many as stay in a core's cache."""
 
 
 def spectrum_of(features: Features) -> Spectrum:
@@ -82,14 +80,9 @@ class MaskedFilter:
             mask: ``(size, size)`` 0 to 1, where the filter may be other than 0.
             rate: share of the sample in what is remembered; 1 for the first.
         """
-        solved = np.empty_like(spectrum)
-        weights = np.empty(len(spectrum), np.float32)
-        for first in range(0, len(spectrum), BLOCK):
-            part = slice(first, first + BLOCK)
-            solved[part] = self._solved(spectrum[part], mask)
-            response = fft.irfft2(np.conj(solved[part]) * spectrum[part], s=(self.size, self.size))
-            weights[part] = response.reshape(len(response), -1).max(axis=1)
-        weights = np.maximum(weights, 0)
+        solved = self._solved(spectrum, mask)
+        response = fft.irfft2(np.conj(solved) * spectrum, s=(self.size, self.size))
+        weights = np.maximum(response.reshape(len(response), -1).max(axis=1), 0)
         weights /= max(float(weights.sum()), 1e-9)
         if self._filter is None or self._weights is None:
             self._filter, self._weights = solved, weights
