@@ -343,7 +343,8 @@ class Crowd:
             else:
                 away = person.seen_at < newcomer.first_seen
             if away:
-                newcomer.resembled(person.number, float(account.looks[other, column]), shows)
+                look = float(account.looks[other, column])
+                newcomer.resembled(person.number, look, shows, account.time)
 
     def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
         odds = np.zeros((len(self.people), len(sights)))

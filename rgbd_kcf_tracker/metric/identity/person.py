@@ -30,6 +30,9 @@ FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
 ENOUGH = 1.5
 """Sightings, counted by how much showed, from which somebody is taken to be another."""
+LATELY = 1.5
+"""Seconds after which a sighting says a third of what it said: at first often little of somebody
+shows, or somebody else beside him, and a number may have gone over from one to another."""
 AGAIN = 0.25
 """What twice as many sightings say more, as a share of what one says."""
 TRAVELLED = 0.5
@@ -70,7 +73,7 @@ class Person:
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
-        self._resembles: dict[int, tuple[float, float]] = {}
+        self._resembles: dict[int, tuple[float, float, float]] = {}
         self.gallery = Gallery()
 
     @property
@@ -94,30 +97,32 @@ class Person:
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
 
-    def resembled(self, other: int, odds: float, weight: float) -> None:
+    def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
         """Take log-odds of a sighting of this one to look like another, who is not in view.
 
         Args:
             other: the number of the other.
             odds: log-odds.
+            time: seconds; what was seen before counts less.
             weight: how much of this one showed, 0 to 1: a part that is seen past somebody else has
                 colours of his as well.
         """
-        total, count = self._resembles.get(other, (0.0, 0.0))
-        self._resembles[other] = total + weight * odds, count + weight
+        total, count, last = self._resembles.get(other, (0.0, 0.0, time))
+        kept = float(np.exp((last - time) / LATELY))
+        self._resembles[other] = kept * total + weight * odds, kept * count + weight, time
 
     def resemblance(self, other: int) -> float | None:
-        """Mean log-odds, over all sightings, of looking like another; None if never compared."""
-        total, count = self._resembles.get(other, (0.0, 0.0))
+        """Mean log-odds, over the sightings of late, of looking like another; None if never compared."""
+        total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
         return total / count if count > 0 else None
 
     def resembles(self, other: int) -> float:
-        """Log-odds, by all sightings together, of looking like another; 0 after less than two.
+        """Log-odds, by the sightings of late together, of looking like another; 0 after less than two.
 
         Sightings of one walk say little more than one of them: that two people wear the same does
         not change from frame to frame.
         """
-        total, count = self._resembles.get(other, (0.0, 0.0))
+        total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
         return total / count * (1 + AGAIN * float(np.log2(count))) if count >= ENOUGH else 0.0
 
     def become(self, newcomer: Person) -> None:
