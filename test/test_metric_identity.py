@@ -215,17 +215,21 @@ def test_a_person_stays_in_the_world_while_the_camera_turns():
     assert one.last is None
 
 
-def test_resemblance_is_the_mean_over_all_sightings_by_what_they_show():
+def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     one = Person(1, np.zeros(2), 0.0)
     assert one.resemblance(7) is None
     for odds in (3.0, -1.0, 1.0):
-        one.resembled(7, odds, 1.0)
+        one.resembled(7, odds, 1.0, 0.0)
     assert one.resemblance(7) == pytest.approx(1.0)
-    one.resembled(7, -100.0, 0.0)
+    one.resembled(7, -100.0, 0.0, 0.0)
     assert one.resemblance(7) == pytest.approx(1.0)
     # More sightings say more, but by far not as many times more.
     assert 1.0 < one.resembles(7) < 2.0
     assert one.resembles(8) == 0.0
+    # What was seen long ago, when little of him showed, says no more who he is.
+    for time in (20.0, 20.5, 21.0):
+        one.resembled(7, -2.0, 1.0, time)
+    assert one.resemblance(7) == pytest.approx(-2.0, abs=0.01)
 
 
 # -- everyone together ----------------------------------------------------------------------------
