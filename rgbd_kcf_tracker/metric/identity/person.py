@@ -112,12 +112,12 @@ class Person:
         self._resembles[other] = kept * total + weight * odds, kept * count + weight, time
 
     def resemblance(self, other: int) -> float | None:
-        """Mean log-odds of looking like another in the sightings of late; None if never compared."""
+        """Mean log-odds of looking like another, in the sightings of late; None for none."""
         total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
         return total / count if count > 0 else None
 
     def resembles(self, other: int) -> float:
-        """Log-odds of looking like another, by the sightings of late together; 0 after less than two.
+        """Log-odds of looking like another, by all sightings of late; 0 after less than two.
 
         Sightings of one walk say little more than one of them: that two people wear the same does
         not change from frame to frame.
