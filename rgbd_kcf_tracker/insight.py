@@ -158,8 +158,9 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
         ):
             continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
+        cues |= {said.name: said.share for said in candidate.evidence.more}
         chance = float(candidate.probability)
-        alone = min(max(float(share.sum()), -evidence.SUREST), evidence.SUREST)
+        alone = min(max(sum(cues.values()), -evidence.SUREST), evidence.SUREST)
         beside = math.log(chance / (1 - chance)) - alone
         cues[evidence.OTHER_PLACES] = beside if beside < LEAST_LOSS else 0.0
         considered.append(Considered(box, chance, cues, mask))

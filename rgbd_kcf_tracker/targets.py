@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
 from rgbd_kcf_tracker.metric.targets import MetricTargets
@@ -27,9 +29,11 @@ class TargetSet:
     Args:
         variant: name of the tracker.
         parameters: its parameters, None for the released defaults.
+        cues: further ones for the verdict of ``metric``, as an embedding's likeness.
 
     Raises:
-        ParameterError: for an unknown variant, or parameters of another one.
+        ParameterError: for an unknown variant, parameters of another one, or cues with another than
+            ``metric``.
 
     Example:
         >>> targets = TargetSet('metric')
@@ -39,14 +43,19 @@ class TargetSet:
     """
 
     def __init__(
-        self, variant: str = DEFAULT_VARIANT, parameters: Parameters | None = None
+        self,
+        variant: str = DEFAULT_VARIANT,
+        parameters: Parameters | None = None,
+        cues: Sequence[Cue] = (),
     ) -> None:
         create_tracker(variant, parameters)  # refuses what does not fit
         self._variant = variant
         self._parameters = parameters or default_parameters(variant)
         self._together: MetricTargets | None = None
         if isinstance(self._parameters, MetricParameters):
-            self._together = MetricTargets(self._parameters)
+            self._together = MetricTargets(self._parameters, cues)
+        elif cues:
+            raise ParameterError(f'variant {variant} knows no cues: use metric')
         self._trackers: dict[int, Tracker] = {}
         self._started: dict[int, Track] = {}
         self._next = 1

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import importlib
 import itertools
 import sys
 from dataclasses import dataclass
@@ -23,11 +24,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
+from rgbd_kcf_tracker.errors import DatasetError, ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample, at_rate, with_intrinsics
 from rgbd_kcf_tracker.evaluation.passes import OnePass, run
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.targets import MetricTracker
@@ -60,9 +62,12 @@ class Examples:
 
     @property
     def features(self) -> FloatArray:
-        """The regression's inputs, ``(n, len(WEIGHTS))``."""
-        rows = [evidence.features() for evidence in self.evidence]
-        return np.array(rows, np.float64).reshape(len(rows), len(WEIGHTS))
+        """The regression's inputs, further cues before the last, ``(n, k)``."""
+        rows = []
+        for evidence in self.evidence:
+            *known, one = evidence.features()
+            rows.append([*known, *(said.value for said in evidence.more), one])
+        return np.array(rows, np.float64).reshape(len(rows), -1)
 
     def where(self, chosen: npt.NDArray[np.bool_]) -> Examples:
         """Those of them that are ``chosen``, ``(n,)`` bool."""
@@ -104,14 +109,16 @@ class _Meetings:
                 self._astray = 0
 
 
-def meet(sequence: Sequence, rate: float | None, camera: Intrinsics | None) -> Examples:
+def meet(
+    sequence: Sequence, rate: float | None, camera: Intrinsics | None, cues: tuple[Cue, ...] = ()
+) -> Examples:
     """Run the tracker over a sequence and label every candidate that it weighs."""
     samples = sequence.open().samples
     if rate is not None:
         samples = at_rate(samples, rate)
     if camera is not None:
         samples = with_intrinsics(samples, camera)
-    tracker = MetricTracker(MetricParameters())
+    tracker = MetricTracker(MetricParameters(), cues)
     one = OnePass(tracker)
     met = _Meetings(tracker, one)
     run(itertools.dropwhile(lambda sample: sample.visible is None, samples), one, met)
@@ -213,6 +220,20 @@ def left_out(examples: Examples) -> list[float]:
     return shares
 
 
+def _made(name: str) -> Cue:
+    """A cue by where its maker is.
+
+    Raises:
+        ParameterError: where there is none.
+    """
+    module, _, maker = name.partition(':')
+    try:
+        cue: Cue = getattr(importlib.import_module(module), maker)()
+    except (ImportError, AttributeError, TypeError, ValueError) as error:
+        raise ParameterError(f'--cue {name}: {error}: give MODULE:NAME of a function') from None
+    return cue
+
+
 def main() -> int:
     """Print weights fitted to the data sets of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0] if __doc__ else None)
@@ -221,6 +242,13 @@ def main() -> int:
     parser.add_argument('--rates', default='30,15,10,5', help='frames per second of the scenes')
     parser.add_argument('--fps', type=float, default=5.0, help='of image folders without stamps')
     parser.add_argument('--intrinsics', help='FX,FY,CX,CY of recordings that do not have them')
+    parser.add_argument(
+        '--cue',
+        action='append',
+        default=[],
+        metavar='MODULE:NAME',
+        help='a further cue: what makes one, called without arguments for each run',
+    )
     args = parser.parse_args()
     cv2.setNumThreads(1)
     camera = Intrinsics(*map(float, args.intrinsics.split(','))) if args.intrinsics else None
@@ -233,7 +261,8 @@ def main() -> int:
             for sequence in open_dataset(str(path), options):
                 simulated = sequence.kind == 'sim'
                 for rate in rates if simulated else [None]:
-                    parts.append(meet(sequence, rate, None if simulated else camera))
+                    cues = tuple(_made(name) for name in args.cue)
+                    parts.append(meet(sequence, rate, None if simulated else camera, cues))
                     print(f'{sequence.name}: {len(parts[-1].labels)} candidates', file=sys.stderr)
         examples = joined(parts)
     except RgbdKcfError as error:
@@ -242,7 +271,9 @@ def main() -> int:
     features = examples.features
     weights = fit(with_other_looks(examples))
     print('weights:', ', '.join(f'{w:.3f}' for w in weights))
-    for label, values in (('released', WEIGHTS), ('fitted', weights)):
+    further = [said.weight for said in examples.evidence[0].more]
+    released = np.array([*WEIGHTS[:-1], *further, WEIGHTS[-1]])
+    for label, values in (('released', released), ('fitted', weights)):
         chance = probabilities(features, values)
         share = np.mean((chance > 0.5) == (examples.labels == 1))
         print(f'{label}: {100 * share:.1f} % of {len(chance)} candidates decided rightly')

@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
-from rgbd_kcf_tracker.metric.decide.evidence import Evidence, probability
+from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
+from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
@@ -77,6 +80,7 @@ class BySurface:
         first: the target's silhouette in it.
         person: the target as one of the crowd.
         parameters: of the tracker.
+        cues: further ones for the verdict.
 
     Attributes:
         candidates: of the last frame, for looking at what the tracker saw.
@@ -84,9 +88,14 @@ class BySurface:
     """
 
     def __init__(
-        self, account: Account, first: Silhouette, person: Person, parameters: MetricParameters
+        self,
+        account: Account,
+        first: Silhouette,
+        person: Person,
+        parameters: MetricParameters,
+        cues: Sequence[Cue] = (),
     ) -> None:
-        self._parameters = parameters
+        self._parameters, self._cues = parameters, cues
         self._person = person
         scene = account.scene
         self.body = Body(first)
@@ -164,8 +173,8 @@ class BySurface:
 
     # -- one frame --------------------------------------------------------------------------------
 
-    def step(self, account: Account, dt: float) -> Candidate | None:
-        """Look for the target in the next frame, ``dt`` seconds later.
+    def step(self, account: Account, frame: Frame, dt: float) -> Candidate | None:
+        """Look for the target in the next ``frame``, ``dt`` seconds later.
 
         Returns:
             What is most likely the target, or None where nothing is. What follows from it is only
@@ -200,7 +209,7 @@ class BySurface:
             if seen.area < MOST_SHARE * self.body.area
             and not any(seen.same(other) for other in free)
         ]
-        self.candidates = [self._weighed(account, seen, dt, missing) for seen in free]
+        self.candidates = self._weighed(account, frame, free, dt, missing)
         self.candidates = [
             c
             for c in self.candidates
@@ -212,7 +221,7 @@ class BySurface:
         first = self.candidates[0]
         whole = gathered(scene, self.body, first.seen, first.placed, others)
         if whole is not None:
-            more = self._weighed(account, whole, dt, missing)
+            (more,) = self._weighed(account, frame, [whole], dt, missing)
             if _logit(more.probability) > _logit(first.probability) - 1.0:
                 self.candidates.insert(0, more)
         best = self.candidates[0] = self._alone(account, self.candidates)
@@ -334,7 +343,29 @@ class BySurface:
             )
         self._cloud.step(dt, scene.view, PLACED_MIDDLE * self.body.height)
 
-    def _weighed(self, account: Account, seen: Silhouette, dt: float, missing: bool) -> Candidate:
+    def _weighed(
+        self, account: Account, frame: Frame, found: list[Silhouette], dt: float, missing: bool
+    ) -> list[Candidate]:
+        boxes = [self.outline(account.scene, seen) for seen in found] if self._cues else []
+        said = [
+            [Said(cue.name, value, cue.weight) for value in values.tolist()]
+            for cue in self._cues
+            for values in [weighed(cue, frame, boxes, self._person.number)]
+        ]
+        more = list(zip(*said, strict=True)) if said else [()] * len(found)
+        return [
+            self._candidate(account, seen, dt, missing, each)
+            for seen, each in zip(found, more, strict=True)
+        ]
+
+    def _candidate(
+        self,
+        account: Account,
+        seen: Silhouette,
+        dt: float,
+        missing: bool,
+        more: tuple[Said, ...],
+    ) -> Candidate:
         scene, body, motion = account.scene, self.body, self.motion
         claim = account.claim(self._person, seen)
         sigma = motion.sigma
@@ -363,6 +394,7 @@ class BySurface:
             rival=claim.rival if self._parameters.use_others else 0.0,
             assigned=claim.assigned if self._parameters.use_others else 0,
             room=claim.room if self._parameters.use_room else 0.0,
+            more=more,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 

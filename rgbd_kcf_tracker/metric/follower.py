@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -13,6 +15,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
@@ -30,6 +33,8 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
+SURE = 0.6
+"""Score from which a target's look is learned from where it was found."""
 ATTEND = 1.0
 """Seconds after which the look of a target followed by its surface is learned again."""
 BLIND = 0.25
@@ -74,6 +79,7 @@ class Follower:
         crowd: everyone, of whom the target is one.
         box: the target.
         parameters: of the tracker.
+        cues: further ones for the verdict, see :class:`~.cues.Cue`.
 
     Attributes:
         person: the target as one of the crowd, None while depth says nothing of it.
@@ -89,8 +95,9 @@ class Follower:
         crowd: Crowd,
         box: Box,
         parameters: MetricParameters,
+        cues: Sequence[Cue] = (),
     ) -> None:
-        self._parameters = parameters
+        self._parameters, self._cues = parameters, cues
         self._crowd = crowd
         self._surface: BySurface | None = None
         self._account: Account | None = None
@@ -106,7 +113,7 @@ class Follower:
         self.seen: Silhouette | None = None
         self.response: float | None = None
         if account is not None:
-            self._lock(account, box)
+            self._lock(frame, account, box)
             self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
             self._about = _people_about(account, box)
         self._look: ByLook | None = None
@@ -153,14 +160,16 @@ class Follower:
 
     # -- by surface -------------------------------------------------------------------------------
 
-    def _lock(self, account: Account, box: Box) -> None:
+    def _lock(self, frame: Frame, account: Account, box: Box) -> None:
         seen = BySurface.surface_of(account, box)
         if seen is None:
             return
         self.seen = seen
         if self.person is None:
             self.person = self._crowd.chosen(account, seen)
-        self._surface = BySurface(account, seen, self.person, self._parameters)
+            for cue in self._cues:
+                cue.start(frame, box, self.person.number)
+        self._surface = BySurface(account, seen, self.person, self._parameters, self._cues)
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
 
     def _depth_of_surface(self) -> float | None:
@@ -177,7 +186,7 @@ class Follower:
         if account is None:
             surface.drift(dt)
             return self._glance(frame, None, view, dt, surface)
-        found = surface.step(account, dt)
+        found = surface.step(account, frame, dt)
         if found is None:
             return self._glance(frame, account.scene, view, dt, surface)
         if surface.hidden_for > REUNION and self.person is not None:
@@ -197,6 +206,9 @@ class Follower:
             return self._tracked(frame, box, found.probability, whole.depth, self._belief())
         box = surface.take(account.scene, found, dt)
         self.seen, self._last = found.seen, (account.scene, found.seen)
+        if self.person is not None and found.probability >= SURE:
+            for cue in self._cues:
+                cue.learn(frame, box, self.person.number)
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
@@ -220,7 +232,7 @@ class Follower:
     def _start_over(self, account: Account, whole: Silhouette) -> None:
         assert self.person is not None
         self.person.gallery = Gallery()
-        self._surface = BySurface(account, whole, self.person, self._parameters)
+        self._surface = BySurface(account, whole, self.person, self._parameters, self._cues)
         self._partial = whole.cut.any
         self.seen = whole
 
@@ -291,7 +303,7 @@ class Follower:
             self._last_box, self._unseen, self._carried = look.box, 0.0, False
         else:
             self._unseen += dt
-        if account is not None and self._unseen < NEWCOMER and self._agree(account, look):
+        if account is not None and self._unseen < NEWCOMER and self._agree(frame, account, look):
             assert self._surface is not None
             assert self.seen is not None
             box = outline_box(account.scene, self.seen)
@@ -331,7 +343,7 @@ class Follower:
         outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
-    def _agree(self, account: Account, look: Look | None) -> bool:
+    def _agree(self, frame: Frame, account: Account, look: Look | None) -> bool:
         """Go over to the surface once one has borne out the look, or somebody new is there."""
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
@@ -340,7 +352,7 @@ class Follower:
             outline = BySurface.outline(account.scene, sight.figure.seen)
             common = outline.intersection(self._last_box)
             if common > COVERED * outline.area and sight.figure.seen.area > NEWCOMER_AREA:
-                self._lock(account, outline)
+                self._lock(frame, account, outline)
                 return self._surface is not None
         if look is None:
             self._agreed = 0
@@ -349,7 +361,7 @@ class Follower:
         if seen is not None and BySurface.outline(account.scene, seen).iou(look.box) > RELOCK_IOU:
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:
-                self._lock(account, look.box)
+                self._lock(frame, account, look.box)
                 return self._surface is not None
         else:
             self._agreed = 0

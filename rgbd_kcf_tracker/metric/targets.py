@@ -12,6 +12,7 @@ another; then each chosen target is followed with care (:mod:`~rgbd_kcf_tracker.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_surface import Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
+from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.follower import Follower
+from rgbd_kcf_tracker.metric.follower import SURE, Follower
 from rgbd_kcf_tracker.metric.identity.middle import (
     in_metres,
     row_by_row,
@@ -33,8 +35,6 @@ from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
 
-SURE = 0.6
-"""Score from which a target's look is learned from where it was found."""
 SHORTEST_STEP = 1e-3
 LONGEST_STEP = 5.0
 """Seconds between two frames; stamps that stand still or jump are taken as these."""
@@ -45,14 +45,16 @@ class MetricTargets:
 
     Args:
         parameters: see :class:`MetricParameters`.
+        cues: further ones for the verdict.
 
     Attributes:
         everyone: whether people whom nobody chose get tracks too.
         account: how the last frame was explained; None where it had no depth.
     """
 
-    def __init__(self, parameters: MetricParameters) -> None:
+    def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
         p = self._parameters = parameters
+        self._cues = cues
         self.everyone = False
         self.account: Account | None = None
         self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin, p.seed)
@@ -80,7 +82,7 @@ class MetricTargets:
         if self._frame is not frame:
             self._perceive(frame)
             self._learn()
-        follower = Follower(frame, self.account, self._crowd, box, self._parameters)
+        follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
         if self.account is not None and follower.seen is not None:
             # Whoever stood there from the first frame on was taken for a part of the room.
             mask = np.zeros(self.account.scene.view.shape, np.bool_)
@@ -216,10 +218,11 @@ class MetricTracker:
 
     Args:
         parameters: see :class:`MetricParameters`.
+        cues: further ones for the verdict.
     """
 
-    def __init__(self, parameters: MetricParameters) -> None:
-        self._parameters = parameters
+    def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
+        self._parameters, self._cues = parameters, cues
         self._targets: MetricTargets | None = None
         self._number = 0
 
@@ -230,7 +233,7 @@ class MetricTracker:
     def start(self, frame: Frame, box: Box) -> Track:
         """See :meth:`~rgbd_kcf_tracker.track.Tracker.start`."""
         require_inside(box, frame)
-        self._targets = MetricTargets(self._parameters)
+        self._targets = MetricTargets(self._parameters, self._cues)
         self._number = self._targets.add(frame, box)
         return self._targets.started(self._number)
 

@@ -23,6 +23,20 @@ AWAY = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+class Said:
+    """What a further cue says of a candidate, see :class:`~.cues.Cue`."""
+
+    name: str
+    value: float
+    weight: float
+
+    @property
+    def share(self) -> float:
+        """In the log-odds that the candidate is the target."""
+        return self.weight * self.value
+
+
+@dataclass(frozen=True, slots=True)
 class Evidence:
     """What speaks for and against a candidate.
 
@@ -44,6 +58,7 @@ class Evidence:
             it is somebody else, 0 where it is somebody new or no figure; 1 for a target that is no
             figure itself.
         room: share of its pixels that stood still before, for a target that has walked.
+        more: what further cues say.
     """
 
     step: float
@@ -59,6 +74,7 @@ class Evidence:
     rival: float
     assigned: int
     room: float
+    more: tuple[Said, ...] = ()
 
     @property
     def behind(self) -> float:
@@ -148,5 +164,5 @@ CUE_WORDS = {
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
-    logit = min(max(float(WEIGHTS @ evidence.features()), -SUREST), SUREST)
-    return 1.0 / (1.0 + math.exp(-logit))
+    logit = float(WEIGHTS @ evidence.features()) + sum(said.share for said in evidence.more)
+    return 1.0 / (1.0 + math.exp(-min(max(logit, -SUREST), SUREST)))

@@ -23,6 +23,9 @@ from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing,
 from rgbd_kcf_tracker.metric.perceive.upright import upright_people
 from rgbd_kcf_tracker.pose import Pose
 
+STILL, STILL_TURN = 0.003, 0.001
+"""Metres and radians, a fifth of a pixel of the view, up to which a camera with poses stands."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -174,12 +177,23 @@ class SceneReader:
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
     ) -> Pose | Lost | None:
         """How the camera has moved: by its poses where both frames have one, else as it seems."""
-        last, self._pose = self._pose, now
+        last = self._pose
         before = self.room.before
         if before.shape != view.shape:
             before = np.zeros(view.shape, np.bool_)
         seems = self._ego.update(image, view, before)
         self.seems = seems if isinstance(seems, Pose) else None
         if last is None or now is None:
+            self._pose = now
             return seems
-        return last.after(now.inverse)
+        moved = last.after(now.inverse)
+        if _stands(moved):  # what it creeps counts from where it stood
+            return None
+        self._pose = now
+        return moved
+
+
+def _stands(moved: Pose) -> bool:
+    """Whether a camera's pose is that of a camera that stands still."""
+    turned = np.arccos(np.clip((np.trace(moved.rotation) - 1) / 2, -1.0, 1.0))
+    return float(turned) < STILL_TURN and float(np.linalg.norm(moved.translation)) < STILL
