@@ -521,18 +521,78 @@ def test_who_was_half_hidden_when_he_was_chosen_is_followed_whole_once_he_shows(
 
 
 def test_a_target_that_may_be_his_twin_has_not_met_him():
-    targets = TargetSet('metric', MetricParameters(use_others=False, acceptance=0.4))
+    targets = TargetSet('metric', MetricParameters(use_others=False))
     assert targets.metric is not None
-    one, covered = Someone(0.0, 3.0), Box(0, 0, COLS, ROWS)
+    one, board = Someone(0.0, 3.0), Box(100, 0, 40, ROWS)
     number = targets.add(picture([one], 0.0), one.box)
     for i in range(1, 9):
-        targets.update(picture([one], 0.1 * i, covered if i > 5 else None))
-    both = picture([Someone(-0.5, 3.0), Someone(0.5, 3.0)], 0.9)
-    assert 0.4 < targets.update(both)[number].score < 0.6
+        targets.update(picture([one], 0.1 * i, board if i > 5 else None))
+    nearer, other = Someone(-0.6, 3.0), Someone(0.7, 3.0)
+    track = targets.update(picture([nearer, other], 0.9, board))[number]
+    assert track.box is not None
+    assert track.score < 0.6
     target = targets.metric.person(number)
     assert target is not None
-    assert abs(target.place[0]) == pytest.approx(0.5, abs=0.05)
+    assert target.place[0] == pytest.approx(nearer.x, abs=0.05)
     assert not target.met
+
+
+def holed(depth: np.ndarray, box: Box) -> None:
+    """Take the readings in and closely about a box."""
+    depth[int(box.y) - 4 : int(box.bottom) + 4, int(box.x) - 4 : int(box.right) + 4] = np.nan
+
+
+@pytest.mark.parametrize(
+    ('raised', 'step', 'found'), [(False, 0.0, False), (True, 0.0, True), (False, 0.02, True)]
+)
+def test_a_look_found_elsewhere_is_taken_where_depth_shows_a_figure_or_the_camera_has_moved(
+    raised: bool, step: float, found: bool
+):
+    """Depth is silent of the target; once it has gone, something that looks so is elsewhere."""
+    first, alike = Someone(-0.6, 3.0), Someone(0.6, 3.0)
+    tracker = create_tracker('metric')
+    for i in range(10):
+        color, depth = images([first] if i < 6 else [alike] if i > 7 else [])
+        if not (raised and i > 7):
+            depth[:] = WALL
+        holed(depth, first.box)
+        pose = None
+        if step > 0:
+            # A wall straight ahead looks the same to a camera that moves along it.
+            pose = Pose(np.eye(3), np.array([step * max(i - 5, 0), 0.0, 0.0]))
+        frame = Frame(color, depth, round(1e8 * i), CAMERA, pose)
+        track = tracker.start(frame, first.box) if i == 0 else tracker.update(frame)
+        if i < 6:
+            assert track.box is not None
+            assert track.box.iou(first.box) > 0.8
+        elif i < 8:
+            assert track.box is None
+    assert (track.box is not None) == found
+    if track.box is not None:
+        assert track.box.iou(alike.box) > 0.8
+
+
+@pytest.mark.parametrize('before', [False, True])
+def test_what_was_there_while_the_target_was_elsewhere_is_not_it(before: bool):
+    """Where depth is silent ahead of the target it appears when it has gone, or was ``before``."""
+    ahead = Someone(0.75, 3.0)
+    tracker = create_tracker('metric')
+    for i in range(16):
+        one = Someone(-0.6 + 0.08 * i, 3.0)
+        color, depth = images([ahead] if before or i > 12 else [])
+        depth[:] = WALL
+        holed(depth, ahead.box)
+        if i < 13:
+            walking, near = images([one])
+            color[near < WALL], depth[near < WALL] = walking[near < WALL], one.z
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        if i < 13:
+            assert track.box is not None
+            assert track.box.iou(one.box) > 0.8
+    assert (track.box is None) == before
+    if track.box is not None:
+        assert track.box.iou(ahead.box) > 0.8
 
 
 def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
