@@ -511,6 +511,11 @@ def test_who_was_half_hidden_when_he_was_chosen_is_followed_whole_once_he_shows(
         targets.update(frame)
         if i == 6:
             number = targets.add(frame, near)
+    assert targets.metric is not None
+    person = targets.metric.person(number)
+    assert person is not None
+    halves = list(person.gallery.views)
+    assert halves
     for i in range(11, 14):
         frame, _, whole = turned(i, half=False)
         track = targets.update(frame)[number]
@@ -518,6 +523,8 @@ def test_who_was_half_hidden_when_he_was_chosen_is_followed_whole_once_he_shows(
         assert track.box.iou(whole) > 0.9
         # His two sides are two surfaces, but no two places where he may be.
         assert track.score > 0.9
+    assert targets.metric.person(number) is person
+    assert not any(view is half for view in person.gallery.views for half in halves)
 
 
 def test_a_target_that_may_be_his_twin_has_not_met_him():
