@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from people_rig import GOOD
 
-from rgbd_kcf_tracker import Frame, Intrinsics
+from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.features.windows import resampled
+from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
@@ -22,6 +23,7 @@ from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectru
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
     band_histograms,
@@ -303,6 +305,19 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
     whole = resampled(image, 100, 100, 100, 100)
     assert np.abs(whole.astype(int) - image[50:150, 50:150]).max() <= 1
     assert rgb_codes(whole).max() < 4096
+
+
+def test_a_glance_finds_the_target_and_learns_nothing():
+    image, box = blobs(4, 300), Box(120, 110, 50, 70)
+    first = Frame(image, None, 0)
+    look = ByLook(first, box, MetricParameters())
+    before = look.glance(first, box, 0.03)
+    assert before is not None
+    assert before.box.iou(box) > 0.9
+    faded = cv2.addWeighted(image, 0.6, blobs(5, 300), 0.4, 0)
+    for i in range(1, 20):
+        assert look.glance(Frame(faded, None, i), box, 0.1) is not None
+    assert look.glance(first, box, 0.03) == before
 
 
 # -- the verdict ----------------------------------------------------------------------------------
