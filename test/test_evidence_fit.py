@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.evaluation.evidence_fit import (
     probabilities,
     with_other_looks,
 )
-from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS
+from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Said
 
 
 def met(count: int = 200) -> Examples:
@@ -45,6 +45,21 @@ def test_fitted_weights_tell_the_target_from_what_stands_elsewhere():
     chance = probabilities(examples.features, weights)
     assert ((chance > 0.5) == (examples.labels == 1)).mean() > 0.99
     assert min(left_out(examples)) > 0.95
+
+
+def test_the_weight_of_a_further_cue_is_fitted_with_the_others():
+    examples = met()
+    rng = np.random.default_rng(1)
+    told = [
+        dataclasses.replace(GOOD, more=(Said('net', (1.0 if label else -1.0) + noise, 1.0),))
+        for label, noise in zip(examples.labels, 0.3 * rng.standard_normal(200), strict=True)
+    ]
+    alike = dataclasses.replace(examples, evidence=np.array(told, np.object_))
+    assert alike.features.shape == (200, len(WEIGHTS) + 1)
+    weights = fit(alike)
+    assert weights[-2] > 1.0, 'before that of the constant'
+    chance = probabilities(alike.features, weights)
+    assert ((chance > 0.5) == (examples.labels == 1)).mean() > 0.95
 
 
 def test_a_thing_of_wholly_other_look_at_the_targets_place_does_not_pass():

@@ -281,6 +281,22 @@ def test_poses_that_are_given_are_taken_before_what_seems():
     assert scene.motion.of(np.array([0, 0, 3.0])) == pytest.approx([0, 0, 2.8])
 
 
+def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader.read(picture([], 0.0, pose=STILL), 0.0)
+    motions = []
+    for i in range(1, 9):
+        creeping = Pose(np.eye(3), np.array([0.0, 0.0, 0.001 * i]))
+        scene = reader.read(picture([], 0.1 * i, pose=creeping), 0.1)
+        assert scene is not None
+        motions.append(scene.motion)
+    moved = [motion for motion in motions if motion is not None]
+    assert motions[:2] == [None, None]
+    assert all(isinstance(motion, Pose) for motion in moved)
+    assert len(moved) == 2
+    assert sum(float(motion.translation[2]) for motion in moved) == pytest.approx(-0.006)
+
+
 # -- people who have not moved yet ----------------------------------------------------------------
 
 

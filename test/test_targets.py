@@ -13,6 +13,7 @@ from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, pic
 
 from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
+from rgbd_kcf_tracker.insight import insight_in
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
@@ -40,6 +41,54 @@ def follow(targets: TargetSet, frames: range, scene=both) -> dict[int, list]:
             assert track.id == number
             tracks.setdefault(number, []).append(track)
     return tracks
+
+
+# -- further cues ---------------------------------------------------------------------------------
+
+
+class Likes:
+    """A cue that likes what is on one side of the picture."""
+
+    name, weight = 'side', 2.0
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+        self.started: list[tuple[int, Box]] = []
+        self.learned: list[Box] = []
+        self.asked: list[int] = []
+
+    def start(self, frame: Frame, box: Box, target: int) -> None:
+        self.started.append((target, box))
+
+    def weigh(self, frame: Frame, boxes: list[Box], target: int) -> np.ndarray:
+        self.asked.append(len(boxes))
+        return np.full(len(boxes), self.value)
+
+    def learn(self, frame: Frame, box: Box, target: int) -> None:
+        self.learned.append(box)
+
+
+def test_a_further_cue_is_asked_of_all_candidates_and_decides_with_the_others():
+    for value, there in ((0.5, True), (-20.0, False)):
+        cue = Likes(value)
+        targets = TargetSet('metric', cues=[cue])
+        number = targets.add(both(0), left(0).box)
+        last = follow(targets, range(1, 5))[number][-1]
+        assert (last.box is not None) == there
+        assert [box for _, box in cue.started] == [left(0).box]
+        assert bool(cue.learned) == there
+        assert len(cue.asked) == 4, 'once a frame, of all candidates'
+        considered = insight_in(targets, number).considered[0]
+        assert considered.cues['side'] == pytest.approx(2.0 * value)
+
+
+def test_cues_that_cannot_be_are_refused():
+    with pytest.raises(ParameterError, match='kcf knows no cues'):
+        TargetSet('kcf', cues=[Likes(1.0)])
+    targets = TargetSet('metric', cues=[Likes(float('nan'))])
+    targets.add(both(0), left(0).box)
+    with pytest.raises(ParameterError, match="the cue 'side' must give a finite number for each"):
+        targets.update(both(1))
 
 
 # -- ids ------------------------------------------------------------------------------------------
