@@ -237,7 +237,7 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         at = rig.index + 1  # type: ignore[attr-defined]
         play_hidden(rig, range(at, at + 20))
         # In the very first hidden frame there are none yet.
-        page.until("(page.shown.targets[0].particles || []).length > 50")
+        page.until('(page.shown.targets[0].particles || []).length > 50')
         assert page.value('page.shown.targets[0].state') != 'tracking'
         assert page.value('page.shown.targets[0].ellipse.length') == 6
         confused = page.value('page.entries.map(e => e.targets[0] ? e.targets[0][3] : 0)')

@@ -43,6 +43,28 @@ def follow(targets: TargetSet, frames: range, scene=both) -> dict[int, list]:
     return tracks
 
 
+def test_what_is_put_off_until_the_answer_is_out_changes_no_answer():
+    answers = []
+    for settles in (None, True, False):
+        targets = TargetSet('metric', MetricParameters())
+        assert targets.metric is not None
+        targets.metric.puts_off = settles is not None
+        numbers = [targets.add(both(0), one(0).box) for one in (left, right)]
+        seen, waited = [], 0
+        for i in range(1, 26):
+            seen.append(targets.update(both(i)))
+            looks = [targets.metric._followers[n]._look for n in numbers]
+            waited += any(look._to_learn is not None for look in looks)
+            if settles:
+                targets.metric.settle()
+                assert all(look._to_learn is None for look in looks)
+        assert (waited > 0) == (settles is not None)
+        # At the end depth is silent, and the look that was learned is asked.
+        blind = [dataclasses.replace(both(i), depth=None) for i in range(26, 30)]
+        answers.append([seen, [targets.update(frame) for frame in blind]])
+    assert answers[0] == answers[1] == answers[2]
+
+
 # -- further cues ---------------------------------------------------------------------------------
 
 

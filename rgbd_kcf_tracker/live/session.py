@@ -359,6 +359,12 @@ class Session:
             self._take_over(frame)
         return self.track
 
+    def settle(self) -> None:
+        """Do what could wait until the answer was out; from then on it does wait."""
+        if self._targets.metric is not None:
+            self._targets.metric.settle()
+            self._targets.metric.puts_off = True
+
     def _update(self, frame: Frame) -> None:
         tracks = self._targets.update(frame)
         chosen = None if self._chosen is None else tracks.pop(self._chosen)

@@ -85,10 +85,12 @@ class ByLook:
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unlearned = 0.0
+        self._to_learn: tuple[Frame, Box, float] | None = None
 
     def step(self, frame: Frame, dt: float) -> Look | None:
         """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
         parameters = self._parameters
+        self.settle()
         self._follow_size(frame)
         if self._hidden:
             sighting = self._searched(frame, None)
@@ -105,6 +107,7 @@ class ByLook:
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
+        self.settle()
         self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
@@ -114,16 +117,29 @@ class ByLook:
         # Nothing bears out that this is the target: it is not learned from.
         return self._taken(frame, sighting, dt, learn=False)
 
-    def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
-        """Learn from a target found by other means, but no more often than every ``interval``."""
+    def attend(self, frame: Frame, box: Box, dt: float, interval: float, later: bool) -> None:
+        """Learn from a target found by other means, but no more often than every ``interval``.
+
+        With ``later`` that is done when :meth:`settle` is called, or else before the next look.
+        """
+        self.settle()
         self._unlearned += dt
         if self._unlearned < interval:
             return
+        self._to_learn = frame, box, self._unlearned
+        self._unlearned = 0.0
+        if not later:
+            self.settle()
+
+    def settle(self) -> None:
+        """Learn what :meth:`attend` has put off."""
+        if self._to_learn is None:
+            return
+        (frame, box, seconds), self._to_learn = self._to_learn, None
         self._follow_size(frame)
         self._place(box)
-        self._appearance.attend(frame.color, self._cx, self._cy, self._scale, self._unlearned)
+        self._appearance.attend(frame.color, self._cx, self._cy, self._scale, seconds)
         self._depth = depth_in(frame, box) or self._depth
-        self._unlearned = 0.0
 
     def refuse(self) -> None:
         """Take back what :meth:`step` found: the target is hidden."""

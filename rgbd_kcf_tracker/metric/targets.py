@@ -49,13 +49,15 @@ class MetricTargets:
 
     Attributes:
         everyone: whether people whom nobody chose get tracks too.
+        puts_off: whether what can wait until an answer is out waits for :meth:`settle`, or else for
+            the next frame: the answers are the same, if a frame's images stay as they were so long.
         account: how the last frame was explained; None where it had no depth.
     """
 
     def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
         p = self._parameters = parameters
         self._cues = cues
-        self.everyone = False
+        self.everyone = self.puts_off = False
         self.account: Account | None = None
         self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin, p.seed)
         self._crowd = Crowd()
@@ -115,7 +117,10 @@ class MetricTargets:
         if not self._followers and not self.everyone:
             self._frame = None
             return {}
+        self.settle()
         dt = self._perceive(frame)
+        for follower in self._followers.values():
+            follower.puts_off = self.puts_off
         tracks = {
             number: dataclasses.replace(
                 follower.step(frame, self.account, self._reader.last_view, dt), id=number
@@ -126,6 +131,11 @@ class MetricTargets:
         if self.everyone:
             tracks.update(self._others(frame))
         return tracks
+
+    def settle(self) -> None:
+        """Do what was put off, see :attr:`puts_off`."""
+        for follower in self._followers.values():
+            follower.settle()
 
     def weighed(self, number: int) -> list[tuple[Candidate, Box]]:
         """What was weighed for a target in the last frame, see :meth:`Follower.weighed`."""
