@@ -55,7 +55,7 @@ class MetricParameters(Parameters):
         maximum=0.99,
     )
     recognition: float = parameter(
-        0.65,
+        0.55,
         'The same after an absence of a second or more: a stranger is worse than no box.',
         minimum=0.01,
         maximum=0.99,
