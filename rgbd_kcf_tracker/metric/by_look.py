@@ -90,7 +90,6 @@ class ByLook:
     def step(self, frame: Frame, dt: float) -> Look | None:
         """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
         parameters = self._parameters
-        self.settle()
         self._follow_size(frame)
         if self._hidden:
             sighting = self._searched(frame, None)
@@ -107,7 +106,6 @@ class ByLook:
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
-        self.settle()
         self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
@@ -117,22 +115,19 @@ class ByLook:
         # Nothing bears out that this is the target: it is not learned from.
         return self._taken(frame, sighting, dt, learn=False)
 
-    def attend(self, frame: Frame, box: Box, dt: float, interval: float, later: bool) -> None:
-        """Learn from a target found by other means, but no more often than every ``interval``.
+    def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
+        """Have :meth:`settle` learn from a target found by other means.
 
-        With ``later`` that is done when :meth:`settle` is called, or else before the next look.
+        It must be called before the next frame. No more often than every ``interval``.
         """
-        self.settle()
         self._unlearned += dt
         if self._unlearned < interval:
             return
         self._to_learn = frame, box, self._unlearned
         self._unlearned = 0.0
-        if not later:
-            self.settle()
 
     def settle(self) -> None:
-        """Learn what :meth:`attend` has put off."""
+        """Learn what :meth:`attend` asked for."""
         if self._to_learn is None:
             return
         (frame, box, seconds), self._to_learn = self._to_learn, None

@@ -82,7 +82,6 @@ class Follower:
         cues: further ones for the verdict, see :class:`~.cues.Cue`.
 
     Attributes:
-        puts_off: whether what can wait for :meth:`settle` does.
         person: the target as one of the crowd, None while depth says nothing of it.
         seen: its silhouette in the last frame, None where it has none.
         response: the filter's in the last frame against its own recent mean, None where it was not
@@ -110,7 +109,6 @@ class Follower:
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
         self._last: tuple[Scene, Silhouette] | None = None
-        self.puts_off = False
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         self.response: float | None = None
@@ -135,7 +133,7 @@ class Follower:
         return [(c, self._surface.box(scene, c)) for c in self._surface.candidates]
 
     def settle(self) -> None:
-        """Do what was put off."""
+        """Do what no answer waits for; after each :meth:`step`, before the next."""
         if self._look is not None:
             self._look.settle()
 
@@ -217,7 +215,7 @@ class Follower:
             for cue in self._cues:
                 cue.learn(frame, box, self.person.number)
         if self._look is not None and not found.seen.cut.any:
-            self._look.attend(frame, box, dt, ATTEND, self.puts_off)
+            self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
 
     def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:

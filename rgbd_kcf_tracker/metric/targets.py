@@ -119,8 +119,6 @@ class MetricTargets:
             return {}
         self.settle()
         dt = self._perceive(frame)
-        for follower in self._followers.values():
-            follower.puts_off = self.puts_off
         tracks = {
             number: dataclasses.replace(
                 follower.step(frame, self.account, self._reader.last_view, dt), id=number
@@ -130,6 +128,8 @@ class MetricTargets:
         self._learn()
         if self.everyone:
             tracks.update(self._others(frame))
+        if not self.puts_off:
+            self.settle()
         return tracks
 
     def settle(self) -> None:
