@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from rgbd_kcf_tracker.evaluation.evidence_fit import (
     fit,
     joined,
     left_out,
+    main,
     probabilities,
     with_other_looks,
 )
@@ -60,6 +62,19 @@ def test_the_weight_of_a_further_cue_is_fitted_with_the_others():
     assert weights[-2] > 1.0, 'before that of the constant'
     chance = probabilities(alike.features, weights)
     assert ((chance > 0.5) == (examples.labels == 1)).mean() > 0.95
+
+
+def test_a_cue_that_cannot_be_made_is_told_in_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    (tmp_path / 'a_cue.py').write_text('def make():\n    raise RuntimeError("no net.onnx here")\n')
+    monkeypatch.syspath_prepend(tmp_path)
+    for cue, words in (('a_cue:make', 'no net.onnx here'), ('nowhere:make', 'nowhere')):
+        monkeypatch.setattr('sys.argv', ['evidence_fit', 'sim:border', '--cue', cue])
+        assert main() == 2
+        said = capsys.readouterr().err
+        assert f'--cue {cue}: ' in said
+        assert words in said
 
 
 def test_a_thing_of_wholly_other_look_at_the_targets_place_does_not_pass():

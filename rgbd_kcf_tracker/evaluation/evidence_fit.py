@@ -229,7 +229,7 @@ def _made(name: str) -> Cue:
     module, _, maker = name.partition(':')
     try:
         cue: Cue = getattr(importlib.import_module(module), maker)()
-    except (ImportError, AttributeError, TypeError, ValueError) as error:
+    except Exception as error:  # whatever somebody else's code may raise
         raise ParameterError(f'--cue {name}: {error}: give MODULE:NAME of a function') from None
     return cue
 
