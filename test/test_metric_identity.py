@@ -265,6 +265,14 @@ class Watched:
         assert account is not None
         return who(account, 0)
 
+    def beside(self, left, right) -> tuple[Account, list[int]]:
+        """Two who walk beside each other; the last account, and their sights from the left."""
+        for i in range(10):
+            account = self.see(
+                Someone(-0.9 + 0.05 * i, 3.0, left), Someone(0.9 - 0.03 * i, 3.0, right)
+            )
+        return account, sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
+
     def wait(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.5)):
             self.see(dt=0.5)
@@ -365,11 +373,7 @@ def test_a_chosen_one_comes_back_as_a_stranger_who_resembles_him():
 
 def test_who_comes_back_is_not_taken_for_one_who_was_seen_beside_him():
     watched = Watched()
-    for i in range(10):
-        account = watched.see(
-            Someone(-0.9 + 0.05 * i, 3.0, RED), Someone(0.9 - 0.03 * i, 3.0, DARK_RED)
-        )
-    columns = sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
+    account, columns = watched.beside(RED, DARK_RED)
     chosen, other = (who(account, c) for c in columns)
     chosen.chosen = True
 
@@ -405,11 +409,7 @@ def test_nothing_but_the_place_is_learned_of_who_may_be_somebody_else(sure: bool
 
 def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
     watched = Watched()
-    for i in range(10):
-        account = watched.see(
-            Someone(-0.9 + 0.05 * i, 3.0, RED), Someone(0.9 - 0.03 * i, 3.0, BLUE)
-        )
-    columns = sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
+    account, columns = watched.beside(RED, BLUE)
     one = who(account, columns[0])
     others = account.others(one)
     mine, theirs = (account.sights[c].figure.seen for c in columns)
