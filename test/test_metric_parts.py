@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
@@ -296,6 +297,47 @@ def test_scale_filter_finds_the_factor(factor: float):
     larger = cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR)
     found = scales.factor(larger, 150 * factor, 150 * factor, 60, 90)
     assert found == pytest.approx(factor, rel=0.03)
+
+
+def beside(middle: np.ndarray, width: int, height: int, cx: float, cy: float) -> np.ndarray:
+    """An image in which a patch is drawn at that size, before a wall of another texture."""
+    image = blobs(8, 320) // 2
+    drawn = cv2.resize(middle, (width, height), interpolation=cv2.INTER_LINEAR)
+    left, top = round(cx - width / 2), round(cy - height / 2)
+    image[top : top + height, left : left + width] = drawn
+    return image
+
+
+@pytest.mark.parametrize(
+    ('width', 'height', 'growth'), [(84, 108, 1.2), (56, 72, 0.8), (70, 80, 1.0), (70, 90, 1.0)]
+)
+def test_flow_tells_shift_and_growth_but_not_a_crouch(width: int, height: int, growth: float):
+    patch = blobs(3, 160)
+    flow = TextureFlow()
+    assert flow.since(patch) is None
+    first = beside(patch, 70, 90, 150, 150)
+    flow.keep(first, 150, 150, 70, 90, lambda image: np.ones(image.shape[:2], np.float32))
+    told = flow.since(beside(patch, width, height, 160, 144))
+    assert told is not None
+    assert told.growth == pytest.approx(growth, abs=0.03)
+    assert (told.dx, told.dy) == pytest.approx((10, -6), abs=2.5)
+    assert flow.since(blobs(11, 320)) is None
+    flow.forget()
+    assert flow.since(beside(patch, width, height, 160, 144)) is None
+
+
+def test_a_target_that_comes_fast_is_followed_on_colour_alone():
+    """At 10 Hz and 22 % a frame it grows by more than the filter over scale covers."""
+    patch, sizes = blobs(3, 240), [40 * 1.22**n for n in range(9)]
+    frames = [
+        Frame(beside(patch, round(s), round(1.2 * s), 150, 150), None, n * 100_000_000)
+        for n, s in enumerate(sizes[:8])
+    ]
+    look = ByLook(frames[0], Box.from_center(150, 150, 40, 48), MetricParameters())
+    for frame, size in zip(frames[1:], sizes[1:], strict=False):
+        found = look.step(frame, 0.1)
+        assert found is not None
+        assert found.box.iou(Box.from_center(150, 150, size, 1.2 * size)) > 0.6
 
 
 def test_windows_reach_outside_the_image_and_shrink_large_ones():

@@ -18,11 +18,11 @@ import numpy as np
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting
+from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
+from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 
-LEARN_RATIO = 0.6
-"""Response against its mean from which the target is seen well enough to learn from."""
 LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window."""
 UNSURE = 0.7
@@ -82,6 +82,8 @@ class ByLook:
         self._scales = ScaleFilter(box.width, box.height)
         self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
         self._first_depth = self._depth = depth_in(frame, box)
+        self._flow = TextureFlow()
+        self._keep(frame, True)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unlearned = 0.0
@@ -95,14 +97,18 @@ class ByLook:
             sighting = self._searched(frame, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
         else:
+            if self._depthless(frame):
+                self._flow_on(frame)
             sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
             if dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, sighting)
-                if other.ratio > sighting.ratio + BETTER:
+                if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio
         self.response = sighting.ratio
-        return None if self._hidden else self._taken(frame, sighting, dt)
+        look = None if self._hidden else self._taken(frame, sighting, dt)
+        self._keep(frame, look is not None)
+        return look
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
@@ -147,12 +153,37 @@ class ByLook:
             return
         across, down = size[0] / self._size_of_image[0], size[1] / self._size_of_image[1]
         self._size_of_image = size
+        self._flow.forget()
         self._cx, self._cy = self._cx * across, self._cy * down
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
         self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
 
+    def _depthless(self, frame: Frame) -> bool:
+        """Whether depth tells nothing of the target's size."""
+        return frame.depth is None or self._first_depth is None
+
+    def _keep(self, frame: Frame, seen: bool) -> None:
+        if seen and self._depthless(frame):
+            self._flow.keep(
+                frame.color, self._cx, self._cy, *self._size, self._appearance.posterior
+            )
+        else:
+            self._flow.forget()
+
+    def _flow_on(self, frame: Frame) -> None:
+        """Expect the target where its texture has gone, at the size to which that has grown."""
+        flow = self._flow.since(frame.color)
+        if flow is None:
+            return
+        self._cx = float(np.clip(self._cx + flow.dx, 0, frame.width))
+        self._cy = float(np.clip(self._cy + flow.dy, 0, frame.height))
+        # What the filter over scale resolves is left to it: the flow's small errors add up.
+        if abs(flow.growth - 1) > SCALE_STEP - 1:
+            self._scale = float(np.clip(self._scale * flow.growth, *SCALE_RANGE))
+
     def _place(self, box: Box) -> None:
+        self._flow.forget()
         self._hidden = False
         self._cx, self._cy = box.cx, box.cy
         ratio = box.height / self._appearance.height
@@ -207,7 +238,7 @@ class ByLook:
         box = Box.from_center(self._cx, self._cy, *self._size)
         if not learn:
             return Look(box, sighting.ratio, depth)
-        if sighting.ratio > LEARN_RATIO:
+        if sighting.ratio > self._parameters.seen_ratio:
             self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
             rate = min(0.15, SCALE_RATE * dt * 30)
             self._scales.learn(frame.color, self._cx, self._cy, box.width, box.height, rate)
