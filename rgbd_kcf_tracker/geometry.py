@@ -82,6 +82,10 @@ class Box:
         """The box about the same centre with both sides times ``factor``."""
         return Box.from_center(self.cx, self.cy, self.width * factor, self.height * factor)
 
+    def over(self, step: float) -> Box:
+        """The box in an image of which every ``step``-th pixel is taken."""
+        return Box(self.x / step, self.y / step, self.width / step, self.height / step)
+
     def moved(self, dx: float, dy: float) -> Box:
         """The box shifted by ``dx, dy`` pixels."""
         return Box(self.x + dx, self.y + dy, self.width, self.height)

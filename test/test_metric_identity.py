@@ -42,7 +42,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     same_person,
     similarity,
 )
-from rgbd_kcf_tracker.metric.identity.person import COAST, Person
+from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -181,10 +181,18 @@ def test_a_person_goes_on_as_before_for_a_moment():
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     for i in range(1, 30):
         one.moved_to(np.array([0.1 * i, 3.0]), 0.1 * i)
-    assert one.velocity == pytest.approx([1.0, 0.0], abs=0.01)
+    assert one.velocity == pytest.approx([1.0, 0.0], abs=0.02)
     assert one.expected(2.9 + 0.3) == pytest.approx([3.2, 3.0], abs=0.01)
-    assert one.expected(2.9 + 60) == pytest.approx([2.9 + COAST, 3.0], abs=0.01)
+    assert one.expected(2.9 + 60) == pytest.approx([2.9 + COAST, 3.0], abs=0.02)
     assert one.travelled == pytest.approx(2.9)
+
+
+def test_two_sights_a_second_apart_tell_where_a_walker_will_be():
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    one.moved_to(np.array([1.2, 3.0]), 1.0)
+    assert one.expected(2.0) == pytest.approx([2.4, 3.0], abs=0.1)
+    ahead, where_he_was = one.place_log_odds(np.array([[2.4, 3.0], [1.2, 3.0]]), 2.0)
+    assert ahead > where_he_was + 0.7
 
 
 def test_the_place_says_less_the_longer_somebody_is_away():
@@ -214,7 +222,7 @@ def test_a_person_stays_in_the_world_while_the_camera_turns():
     one.carried(Pose(rotation, np.zeros(3)), np.array([0.0, 0.0, 1.0]))
     assert one.place == pytest.approx([3.0, -0.1], abs=1e-9)
     assert one.first_place == pytest.approx([3.0, 0.0], abs=1e-9)
-    assert np.hypot(*one.velocity) == pytest.approx(0.5)
+    assert np.hypot(*one.velocity) == pytest.approx(1 - np.exp(-0.1 / VELOCITY_TIME))
     assert one.last is None
 
 

@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
@@ -338,6 +339,51 @@ def test_a_target_that_comes_fast_is_followed_on_colour_alone():
         found = look.step(frame, 0.1)
         assert found is not None
         assert found.box.iou(Box.from_center(150, 150, size, 1.2 * size)) > 0.6
+
+
+def test_a_place_is_unchanged_where_it_looks_as_it_did_while_the_target_was_elsewhere():
+    wall, target = np.full((60, 80, 3), 90, np.uint8), np.full((30, 10, 3), 200, np.uint8)
+
+    def at(column: int) -> tuple[np.ndarray, Box]:
+        image = wall.copy()
+        image[20:50, column : column + 10] = target
+        return image, Box(column, 20, 10, 30)
+
+    elsewhere = Elsewhere()
+    assert not elsewhere.unchanged(*at(10))
+    elsewhere.keep(*at(10))
+    assert not elsewhere.unchanged(*at(10))
+    assert not elsewhere.unchanged(*at(50))
+    assert elsewhere.unchanged(at(50)[0], at(30)[1])
+    assert not elsewhere.unchanged(at(50)[0], at(10)[1])  # what he covered is not known
+    for column in (20, 70):
+        elsewhere.keep(*at(column))
+    assert elsewhere.unchanged(at(50)[0], at(10)[1])  # by the last
+    assert elsewhere.unchanged(at(50)[0], at(70)[1])  # by the first
+    assert not elsewhere.unchanged(np.roll(at(50)[0], 9, 2), Box(200, 200, 5, 5))
+    assert not elsewhere.unchanged(at(50)[0][:, :70], at(30)[1])
+    elsewhere.forget()
+    assert not elsewhere.unchanged(at(50)[0], at(30)[1])
+
+
+def test_on_colour_alone_what_always_stood_there_is_not_the_target():
+    """Its picture hangs on the wall; when it has gone, that is the likest there is."""
+    patch, wall = blobs(3, 60), blobs(8, 320) // 2
+    wall[40:100, 220:280] = patch
+
+    def at(i: int, shown: bool) -> Frame:
+        image = wall.copy()
+        if shown:
+            image[200:260, 30 + 4 * i : 90 + 4 * i] = patch
+        return Frame(image, None, i * 100_000_000)
+
+    look = ByLook(at(0, True), Box(30, 200, 60, 60), MetricParameters())
+    for i in range(1, 16):
+        found = look.step(at(i, i < 10), 0.1)
+        assert (found is not None) == (i < 10)
+    found = look.step(at(16, True), 0.1)
+    assert found is not None
+    assert found.box.iou(Box(94, 200, 60, 60)) > 0.7
 
 
 def test_windows_reach_outside_the_image_and_shrink_large_ones():

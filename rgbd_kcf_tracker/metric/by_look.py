@@ -10,6 +10,7 @@ from depth where there is any on the target, else from a filter over scale.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import cv2
@@ -18,6 +19,7 @@ import numpy as np
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting
+from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere, Image
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
@@ -82,6 +84,8 @@ class ByLook:
         self._scales = ScaleFilter(box.width, box.height)
         self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
         self._first_depth = self._depth = depth_in(frame, box)
+        self._elsewhere = Elsewhere()
+        self._elsewhere.keep(_small(frame), box.over(_step_of(frame)))
         self._flow = TextureFlow()
         self._keep(frame, True)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
@@ -93,20 +97,23 @@ class ByLook:
         """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
         parameters = self._parameters
         self._follow_size(frame)
+        small = _small(frame)
         if self._hidden:
-            sighting = self._searched(frame, None)
+            sighting = self._searched(frame, small, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
-            sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+            sighting = self._look_at(frame, small, self._cx, self._cy)
             if dt > LARGE_STEP and sighting.ratio < UNSURE:
-                other = self._searched(frame, sighting)
+                other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio
         self.response = sighting.ratio
         look = None if self._hidden else self._taken(frame, sighting, dt)
+        if look is not None and look.ratio > parameters.seen_ratio:
+            self._elsewhere.keep(small, look.box.over(_step_of(frame)))
         self._keep(frame, look is not None)
         return look
 
@@ -154,6 +161,7 @@ class ByLook:
         across, down = size[0] / self._size_of_image[0], size[1] / self._size_of_image[1]
         self._size_of_image = size
         self._flow.forget()
+        self._elsewhere.forget()
         self._cx, self._cy = self._cx * across, self._cy * down
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
@@ -193,17 +201,24 @@ class ByLook:
     def _size(self) -> tuple[float, float]:
         return self._appearance.width * self._scale, self._appearance.height * self._scale
 
-    def _searched(self, frame: Frame, best: Sighting | None) -> Sighting:
+    def _look_at(self, frame: Frame, small: Image, cx: float, cy: float) -> Sighting:
+        """Look about a place; what stood there while the target was elsewhere is not seen."""
+        sighting = self._appearance.look(frame.color, cx, cy, self._scale)
+        box = Box.from_center(sighting.cx, sighting.cy, *self._size)
+        if self._elsewhere.unchanged(small, box.over(_step_of(frame))):
+            return dataclasses.replace(sighting, peak=0.0, ratio=0.0)
+        return sighting
+
+    def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.
 
         The cost is the same whatever the image shows: a fixed number of windows is looked into.
         """
         if best is None:
-            best = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
+            best = self._look_at(frame, small, self._cx, self._cy)
             if best.ratio > self._parameters.seen_ratio:
                 return best
-        step = max(1, round(frame.width / SEARCH_WIDTH))
-        small = np.ascontiguousarray(frame.color[step // 2 :: step, step // 2 :: step])
+        step = _step_of(frame)
         posterior = self._appearance.posterior(small)
         # Windows larger than the image show no more of it than all.
         width, height = (
@@ -219,9 +234,7 @@ class ByLook:
         contrast = inner - np.float32(0.7) * outer
         for _ in range(PEAKS):
             row, col = (int(i) for i in np.unravel_index(np.argmax(contrast), contrast.shape))
-            found = self._appearance.look(
-                frame.color, (col + 0.5) * step, (row + 0.5) * step, self._scale
-            )
+            found = self._look_at(frame, small, (col + 0.5) * step, (row + 0.5) * step)
             if found.ratio > best.ratio:
                 best = found
             contrast[
@@ -257,6 +270,16 @@ class ByLook:
         else:
             self._scale *= self._scales.factor(frame.color, self._cx, self._cy, *self._size)
         self._scale = float(np.clip(self._scale, *SCALE_RANGE))
+
+
+def _step_of(frame: Frame) -> int:
+    return max(1, round(frame.width / SEARCH_WIDTH))
+
+
+def _small(frame: Frame) -> Image:
+    """Every so many pixels of a frame's colours, about ``SEARCH_WIDTH`` columns."""
+    step = _step_of(frame)
+    return np.ascontiguousarray(frame.color[step // 2 :: step, step // 2 :: step])
 
 
 def depth_in(frame: Frame, box: Box) -> float | None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
@@ -18,6 +17,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account,
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
@@ -60,8 +60,6 @@ MENDING, MORE = 2.0, 1.6
 it is a part of, and how much larger that is at the least."""
 TALL, TALLER = 0.9, 1.2
 """Metres of height of an upright part of somebody, and of somebody."""
-UNCHANGED, SAME_COLOR = 0.5, 16
-"""Share of a box's middle, and levels of its colours, from which it has not changed."""
 READ = 0.5
 """Share of a box's middle that has depth from which depth tells what is there."""
 OUTLINED = 0.5
@@ -108,7 +106,7 @@ class Follower:
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
-        self._last: tuple[Scene, Silhouette] | None = None
+        self._elsewhere = Elsewhere()
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         self.response: float | None = None
@@ -151,7 +149,7 @@ class Follower:
         self._account = account
         self.seen = None
         if account is not None and account.scene.motion is not None:
-            self._last = None
+            self._elsewhere.forget()
         if self._look is not None:
             self._look.response = None
         if self._surface is None:
@@ -210,7 +208,9 @@ class Follower:
             box = outline_box(account.scene, whole)
             return self._tracked(frame, box, found.probability, whole.depth, self._belief())
         box = surface.take(account.scene, found, dt)
-        self.seen, self._last = found.seen, (account.scene, found.seen)
+        self.seen = found.seen
+        outline = BySurface.outline(account.scene, found.seen)
+        self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
         if self.person is not None and found.probability >= SURE:
             for cue in self._cues:
                 cue.learn(frame, box, self.person.number)
@@ -266,27 +266,16 @@ class Follower:
             blind = scene is None or surface.without_depth(scene) > BLIND
             if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
-                if look is not None and not self._unchanged(scene, look.box):
+                if look is not None and not (
+                    scene is not None
+                    and self._elsewhere.unchanged(scene.image, look.box.over(scene.view.step))
+                ):
                     surface.seen_elsewhere(view, look.box)
                     return self._tracked(
                         frame, look.box, _score(look), look.depth, surface.belief()
                     )
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
-
-    def _unchanged(self, scene: Scene | None, box: Box) -> bool:
-        """Whether a box shows what was there when the target was last seen, elsewhere."""
-        if scene is None or self._last is None:
-            return False
-        then, seen = self._last
-        part = _part(scene, box)
-        elsewhere = np.ones(scene.view.shape, np.bool_)
-        elsewhere[seen.rows, seen.cols] = False
-        elsewhere = elsewhere[part]
-        if np.count_nonzero(elsewhere) <= UNCHANGED * elsewhere.size:
-            return False
-        change = cv2.absdiff(scene.image[part], then.image[part]).max(axis=2)[elsewhere]
-        return float(np.mean(change < SAME_COLOR)) > UNCHANGED
 
     # -- by look ----------------------------------------------------------------------------------
 

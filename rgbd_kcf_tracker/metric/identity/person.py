@@ -16,12 +16,14 @@ FloatArray = npt.NDArray[np.float64]
 
 PLACE_SIGMA = 0.18
 """Metres by which the middle of a silhouette differs from the person's place."""
-WALKING = 1.0
+WALKING = 0.8
 """Metres a second by which a person's next place is unknown."""
-STEADY = 0.5
+STEADY = 0.7
 """Share of that for one who has been followed for some frames and was just seen."""
-COAST = 0.6
+COAST = 1.2
 """Seconds for which a person goes on as before."""
+VELOCITY_TIME = 0.3
+"""Seconds after which a velocity is two thirds of what the sightings since then tell."""
 RECENT = 1.5
 """Seconds between two sightings that tell a velocity."""
 ROOM_AREA = 16.0
@@ -158,7 +160,8 @@ class Person:
         """Take a sight of it at ``place``, ``(2,)`` metres."""
         gone = time - self.seen_at
         if 0 < gone < RECENT:
-            self.velocity = 0.5 * (self.velocity + (place - self.place) / gone)
+            new = 1 - np.exp(-gone / VELOCITY_TIME)
+            self.velocity += new * ((place - self.place) / gone - self.velocity)
         elif gone > 0:
             self.velocity = np.zeros(2)
         self.place = place.copy()

@@ -1,0 +1,71 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a place looked like while the target was at another: where it still does, it is elsewhere."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.geometry import Box
+
+Image = npt.NDArray[np.uint8]
+
+MIDDLE = 0.6
+"""Share of a box's sides that is looked at: at its rim other things show."""
+OUTSIDE = 0.5
+"""Share of it that lies beside where the target was, from which it tells anything."""
+UNCHANGED, SAME_COLOR = 0.65, 16
+"""Share of these pixels, and levels of their colours, from which a place has not changed: of a
+person's box up to half shows what is behind."""
+
+
+class Elsewhere:
+    """Pictures in which the target was surely seen, the first and the last, and where it was.
+
+    The camera must stand still for them to say anything: where it has moved, a place has changed,
+    and nothing is refused.
+    """
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[Image, Box]] = []
+
+    def keep(self, image: Image, box: Box) -> None:
+        """Take a picture, ``(h, w, 3)`` uint8 BGR, and where the target is in it, in its pixels."""
+        self._kept = [*self._kept[:1], (image, box)]
+
+    def forget(self) -> None:
+        """Drop all: the camera has moved."""
+        self._kept = []
+
+    def unchanged(self, image: Image, box: Box) -> bool:
+        """Whether a box shows what was there while the target was elsewhere.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR, of now.
+            box: in its pixels.
+        """
+        rows, cols = image.shape[:2]
+        part = _cells(box.scaled(MIDDLE), rows, cols)
+        now = image[part]
+        for then, place in self._kept:
+            if then.shape != image.shape or not now.size:
+                continue
+            elsewhere = np.ones((rows, cols), np.bool_)
+            elsewhere[_cells(place, rows, cols)] = False
+            there = elsewhere[part]
+            if np.count_nonzero(there) <= OUTSIDE * there.size:
+                continue
+            change = cv2.absdiff(now, then[part]).max(axis=2)[there]
+            if float(np.mean(change < SAME_COLOR)) > UNCHANGED:
+                return True
+        return False
+
+
+def _cells(box: Box, rows: int, cols: int) -> tuple[slice, slice]:
+    """Rows and columns that a box covers."""
+    x0, x1 = (min(max(int(v), 0), cols) for v in (box.x, box.right + 1))
+    y0, y1 = (min(max(int(v), 0), rows) for v in (box.y, box.bottom + 1))
+    return slice(y0, y1), slice(x0, x1)
