@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a place looked like while the target was at another: where it still does, it is elsewhere."""
+"""What a place looked like while the target was at another: if it still does, it is not there."""
 
 from __future__ import annotations
 
