@@ -339,15 +339,10 @@ class Follower:
 
     def _agree(self, frame: Frame, account: Account, look: Look | None) -> bool:
         """Go over to the surface once one has borne out the look, or somebody new is there."""
-        for column, sight in enumerate(account.sights):
-            row = account.owner[column]
-            if row >= 0 and account.people[row].first_seen <= self._since:
-                continue
-            outline = BySurface.outline(account.scene, sight.figure.seen)
-            common = outline.intersection(self._last_box)
-            if common > COVERED * outline.area and sight.figure.seen.area > NEWCOMER_AREA:
-                self._lock(frame, account, outline)
-                return self._surface is not None
+        newcomer = self._newcomer(account)
+        if newcomer is not None:
+            self._lock(frame, account, newcomer)
+            return self._surface is not None
         if look is None:
             self._agreed = 0
             return False
@@ -360,6 +355,28 @@ class Follower:
         else:
             self._agreed = 0
         return False
+
+    def _newcomer(self, account: Account) -> Box | None:
+        """The outline of who has come into sight where the target was, None for nobody.
+
+        Of a target that comes in at the image's edge, or from behind something, only a part was
+        chosen; depth often begins some way inside of the image.
+        """
+        best, likest = None, 0.0
+        for column, sight in enumerate(account.sights):
+            row = account.owner[column]
+            if row >= 0 and account.people[row].first_seen <= self._since:
+                continue
+            outline = BySurface.outline(account.scene, sight.figure.seen)
+            seen, area = sight.figure.seen, outline.area
+            if seen.at_side(account.scene.view, account.scene.rim):
+                area = min(area, self._last_box.area)
+            common = outline.intersection(self._last_box)
+            if seen.area < NEWCOMER_AREA or common < COVERED * area:
+                continue
+            if outline.iou(self._last_box) > likest:
+                best, likest = outline, outline.iou(self._last_box)
+        return best
 
     # -- answers ----------------------------------------------------------------------------------
 
