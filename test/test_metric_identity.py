@@ -27,6 +27,7 @@ from people_rig import (
 )
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
+from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -481,6 +482,46 @@ def test_who_passes_before_a_half_hidden_target_is_not_taken_for_it():
         assert track.box is not None
         assert track.box.iou(target.box) > 0.5 > track.box.iou(passer.box)
         assert track.depth is None or track.depth > 3.4
+
+
+def test_a_target_of_whom_depth_has_few_readings_is_followed_by_them():
+    """As far off in a doorway: a fifth of the pixels, and none of what is behind."""
+    rng = np.random.default_rng(1)
+    tracker = create_tracker('metric')
+    for i in range(8):
+        one = Someone(-0.2 + 0.05 * i, 3.0)
+        color, depth = images([one])
+        if i < 3:
+            box = one.box
+            door = slice(int(box.y) - 3, int(box.bottom) + 3), slice(50, 190)
+            gone = (depth[door] > one.z) | (rng.random(depth[door].shape) > 0.2)
+            depth[door][gone] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert track.box is not None
+        assert track.box.iou(one.box) > 0.9
+        if i == 0 or i > 2:
+            assert track.depth == pytest.approx(one.z, abs=0.05)
+
+
+@pytest.mark.parametrize('own', [False, True])
+def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colours(
+    own: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """At the side of the image there is no depth; more of him shows than was chosen."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    for i in range(8):
+        paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
+        one = Someone(-1.35 + 0.2 * i, 2.2, **paint)
+        color, depth = images([one])
+        depth[:, :30] = np.nan
+        frame, shown = Frame(color, depth, round(1e8 * i), CAMERA), one.box.clipped(COLS, ROWS)
+        assert shown is not None
+        track = tracker.start(frame, shown) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == own
+    if track.box is not None:
+        assert track.box.iou(one.box) > 0.9
 
 
 @pytest.mark.parametrize('twin', [False, True])

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
@@ -148,6 +149,15 @@ class ByLook:
         self._place(box)
         self._appearance.attend(frame.color, self._cx, self._cy, self._scale, seconds)
         self._depth = depth_in(frame, box) or self._depth
+
+    def likely(self, image: Image, mask: npt.NDArray[np.bool_]) -> float:
+        """Mean probability of some pixels' colours to be the target's and not those around it.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR.
+            mask: ``(h, w)`` bool with a pixel at least.
+        """
+        return float(self._appearance.posterior(image)[mask].mean())
 
     def refuse(self) -> None:
         """Take back what :meth:`step` found: the target is hidden."""

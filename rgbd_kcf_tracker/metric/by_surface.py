@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.crowd import REUNION, Account
+from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, Account
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
@@ -38,6 +38,10 @@ LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
 LEAST_FILL = 0.5
 """Share of the given box that a surface fills of which the box shows only a part."""
+SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
+"""Share of the given box that the scattered readings of a target fill, at the least; share of a
+piece that lies in the box from which it is the target's; and metres between the target's readings,
+arms and a far reading's noise included."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it."""
 FIRST_SIGMA = 0.05
@@ -148,10 +152,45 @@ class BySurface:
         pixels[0] = 0
         label = int(np.argmax(pixels))
         large = scene.surfaces.pixels[label] > MOST_SHARE * inside.size
-        if large or pixels[label] < LEAST_FILL * inside.size:
+        if not large and pixels[label] >= LEAST_FILL * inside.size:
+            part = BySurface._within(scene, scene.silhouette(label), box)
+            if BySurface.outline(scene, part).iou(box) >= LOCK_IOU:
+                return part
+        return BySurface._scattered(scene, box)
+
+    @staticmethod
+    def _scattered(scene: Scene, box: Box) -> Silhouette | None:
+        """The few readings of somebody far off, or of whom little shows, that a box is drawn about.
+
+        They stand before the room at about one depth, and belong to nothing that goes on beside it.
+        """
+        step, (rows, cols) = scene.view.step, scene.view.shape
+        x0, x1 = max(0, round(box.x / step)), min(cols, round(box.right / step))
+        y0, y1 = max(0, round(box.y / step)), min(rows, round(box.bottom / step))
+        part = slice(y0, y1), slice(x0, x1)
+        mine = scene.standing[part].copy()
+        if np.count_nonzero(mine) < SCATTERED * mine.size:
             return None
-        part = BySurface._within(scene, scene.silhouette(label), box)
-        return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None
+        labels = scene.surfaces.labels[part]
+        inside = np.bincount(labels[mine], minlength=len(scene.surfaces))
+        inside[0] = scene.surfaces.pixels[0]  # pieces too small to be surfaces
+        mine &= (inside > OWN * scene.surfaces.pixels)[labels]
+        depth = scene.view.depth[part]
+        if not mine.any():
+            return None
+        bins = np.bincount((depth[mine] / THICK).astype(np.intp))
+        # Behind the target the same gap may show more.
+        nearest = int(np.flatnonzero(bins > 0.5 * bins.max())[0])
+        mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
+        if np.count_nonzero(mine) < SCATTERED * mine.size:
+            return None
+        v, u = np.flatnonzero(mine.any(axis=1)), np.flatnonzero(mine.any(axis=0))
+        mask = mine[v[0] : v[-1] + 1, u[0] : u[-1] + 1]
+        seen = Silhouette.of(scene.view, x0 + int(u[0]), y0 + int(v[0]), mask, 0, scene.rim)
+        # What little depth there is of a small thing in a hand may be the hand's.
+        if seen.width * seen.height < SMALL or BySurface.outline(scene, seen).iou(box) < LOCK_IOU:
+            return None
+        return seen
 
     @staticmethod
     def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:

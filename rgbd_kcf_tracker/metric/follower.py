@@ -55,6 +55,8 @@ NEWCOMER_AREA = 0.1
 """Square metres of him, at the least."""
 COVERED = 0.6
 """Share of a newcomer's outline that lies in the target's box, at the least."""
+EVEN = 0.5
+"""Mean probability of his pixels' colours to be the target's, at the least."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least."""
@@ -367,15 +369,22 @@ class Follower:
             row = account.owner[column]
             if row >= 0 and account.people[row].first_seen <= self._since:
                 continue
-            outline = BySurface.outline(account.scene, sight.figure.seen)
-            seen, area = sight.figure.seen, outline.area
-            if seen.at_side(account.scene.view, account.scene.rim):
-                area = min(area, self._last_box.area)
-            common = outline.intersection(self._last_box)
-            if seen.area < NEWCOMER_AREA or common < COVERED * area:
+            seen, scene = sight.figure.seen, account.scene
+            outline = BySurface.outline(scene, seen)
+            shown, least = outline, outline.area
+            if seen.at_side(scene.view, scene.rim):
+                shown = _to_side(outline, seen, scene)
+                least = min(shown.area, self._last_box.area)
+            if (
+                seen.area < NEWCOMER_AREA
+                or shown.intersection(self._last_box) < COVERED * least
+                or shown.iou(self._last_box) < likest
+            ):
                 continue
-            if outline.iou(self._last_box) > likest:
-                best, likest = outline, outline.iou(self._last_box)
+            # Somebody else may come in before the target: he has other colours.
+            colors = scene.image[seen.rows, seen.cols]
+            if self._look is None or self._look.likely(colors, seen.mask) >= EVEN:
+                best, likest = outline, shown.iou(self._last_box)
         return best
 
     # -- answers ----------------------------------------------------------------------------------
@@ -423,6 +432,14 @@ class Follower:
 def _score(look: Look) -> float:
     """Probability that a box found by look is right, from the response against its mean."""
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
+
+
+def _to_side(outline: Box, seen: Silhouette, scene: Scene) -> Box:
+    """An outline that ends where depth does, up to the image's own end."""
+    rim, cols, step = scene.rim, scene.view.shape[1], scene.view.step
+    left = 0.0 if seen.left <= 1 + rim.left else outline.x
+    right = float(cols * step) if seen.cols.stop >= cols - 1 - rim.right else outline.right
+    return Box.from_corners(left, outline.y, right, outline.bottom)
 
 
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:

@@ -35,6 +35,8 @@ COLOR_TIME = 1.0
 """Seconds in which the colours follow."""
 ANCHOR = 0.03
 ANCHOR_PER_METRE = 0.01
+FILLED = 0.4
+"""Share of its outline that a body fills; of one that fills less, readings are missing."""
 WOBBLE = 0.06
 """Metres by which limbs move the outline of a body about its place."""
 DEPTH_SIGMA = 0.05
@@ -77,10 +79,11 @@ class Body:
     """
 
     def __init__(self, first: Silhouette) -> None:
-        self.width, self.height, self.area = first.width, first.height, first.area
+        self.width, self.height = first.width, first.height
+        self.area = max(first.area, FILLED * first.width * first.height)
         self.width_known = not (first.cut.left or first.cut.right)
         self.height_known = not (first.cut.top or first.cut.bottom)
-        self._usual_area = first.area
+        self._usual_area = self.area
         self._colors = np.zeros((BANDS, CODES), np.float32)
         self._around = np.full(CODES, 1 / CODES, np.float32)
         self._odds: npt.NDArray[np.float32] | None = None
