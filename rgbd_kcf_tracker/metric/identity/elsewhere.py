@@ -17,7 +17,7 @@ MIDDLE = 0.6
 """Share of a box's sides that is looked at: at its rim other things show."""
 OUTSIDE = 0.5
 """Share of it that lies beside where the target was, from which it tells anything."""
-UNCHANGED, SAME_COLOR = 0.65, 16
+UNCHANGED, SAME_COLOR = 0.75, 16
 """Share of these pixels, and levels of their colours, from which a place has not changed: of a
 person's box up to half shows what is behind."""
 
