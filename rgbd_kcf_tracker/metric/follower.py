@@ -108,6 +108,7 @@ class Follower:
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
+        self._sides: frozenset[str] = frozenset()
         self._elsewhere = Elsewhere()
         self.person: Person | None = None
         self.seen: Silhouette | None = None
@@ -116,6 +117,7 @@ class Follower:
             self._lock(frame, account, box)
             self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
             self._about = _people_about(account, box)
+            self._sides = _at_sides(box, account.scene)
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
@@ -371,9 +373,8 @@ class Follower:
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = BySurface.outline(scene, seen)
-            shown, least = outline, outline.area
-            if seen.at_side(scene.view, scene.rim):
-                shown = _to_side(outline, seen, scene)
+            shown, least = _to_side(outline, scene), outline.area
+            if _at_sides(shown, scene) & self._sides:
                 least = min(shown.area, self._last_box.area)
             if (
                 seen.area < NEWCOMER_AREA
@@ -434,11 +435,19 @@ def _score(look: Look) -> float:
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
 
 
-def _to_side(outline: Box, seen: Silhouette, scene: Scene) -> Box:
-    """An outline that ends where depth does, up to the image's own end."""
+def _at_sides(box: Box, scene: Scene) -> frozenset[str]:
+    """The sides of what depth sees that a box reaches."""
     rim, cols, step = scene.rim, scene.view.shape[1], scene.view.step
-    left = 0.0 if seen.left <= 1 + rim.left else outline.x
-    right = float(cols * step) if seen.cols.stop >= cols - 1 - rim.right else outline.right
+    reached = {'left': box.x <= (1 + rim.left) * step}
+    reached['right'] = box.right >= (cols - 1 - rim.right) * step
+    return frozenset(side for side, there in reached.items() if there)
+
+
+def _to_side(outline: Box, scene: Scene) -> Box:
+    """An outline that ends where depth does, up to the image's own end."""
+    sides = _at_sides(outline, scene)
+    left = 0.0 if 'left' in sides else outline.x
+    right = float(scene.view.shape[1] * scene.view.step) if 'right' in sides else outline.right
     return Box.from_corners(left, outline.y, right, outline.bottom)
 
 

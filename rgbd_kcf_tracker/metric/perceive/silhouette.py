@@ -104,17 +104,13 @@ class Silhouette:
 
     def at_edge(self, view: DepthView, rim: Rim) -> bool:
         """True where it reaches the end of what the camera sees."""
-        rows = view.shape[0]
+        rows, cols = view.shape
         return (
-            self.at_side(view, rim)
+            self.left <= 1 + rim.left
             or self.top <= 1 + rim.top
+            or self.cols.stop >= cols - 1 - rim.right
             or self.rows.stop >= rows - 1 - rim.bottom
         )
-
-    def at_side(self, view: DepthView, rim: Rim) -> bool:
-        """True where it reaches the left or the right end of what the camera sees."""
-        cols = view.shape[1]
-        return self.left <= 1 + rim.left or self.cols.stop >= cols - 1 - rim.right
 
     def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
