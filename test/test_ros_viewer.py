@@ -215,6 +215,8 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         page.size(1400, 1000)
         page.open(server.url)
         until(rig, lambda: page.value('typeof page !== "undefined" && page.drawn > 1'))
+        # A view has a picture where its frame was heard of, so what follows must be.
+        until(rig, lambda: node._outputs.wanted('evidence'))
         box = scene(rig.index)[2]  # type: ignore[attr-defined]
         page.value(f"send({{do: 'box', x: {box.x}, y: {box.y}, width: 36, height: 60, frame: 0}})")
         until(rig, lambda: page.value("document.querySelectorAll('.candidate').length > 0"))
