@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.colors import view_image
 
 LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window."""
@@ -289,7 +290,8 @@ def _step_of(frame: Frame) -> int:
 def _small(frame: Frame) -> Image:
     """Every so many pixels of a frame's colours, about ``SEARCH_WIDTH`` columns."""
     step = _step_of(frame)
-    return np.ascontiguousarray(frame.color[step // 2 :: step, step // 2 :: step])
+    rows, cols = (len(range(step // 2, side, step)) for side in (frame.height, frame.width))
+    return view_image(frame.color, step, (rows, cols))
 
 
 def depth_in(frame: Frame, box: Box) -> float | None:

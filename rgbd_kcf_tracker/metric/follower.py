@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account,
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
+from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
-from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
@@ -108,7 +108,7 @@ class Follower:
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
-        self._sides: frozenset[str] = frozenset()
+        self._ends: Sides | None = None
         self._elsewhere = Elsewhere()
         self.person: Person | None = None
         self.seen: Silhouette | None = None
@@ -117,7 +117,7 @@ class Follower:
             self._lock(frame, account, box)
             self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
             self._about = _people_about(account, box)
-            self._sides = _at_sides(box, account.scene)
+            self._ends = _ends(box, account.scene)
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
@@ -270,16 +270,19 @@ class Follower:
             blind = scene is None or surface.without_depth(scene) > BLIND
             if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
-                if look is not None and not (
-                    scene is not None
-                    and self._elsewhere.unchanged(scene.image, look.box.over(scene.view.step))
-                ):
+                if look is not None and not self._unchanged(scene, look.box):
                     surface.seen_elsewhere(view, look.box)
                     return self._tracked(
                         frame, look.box, _score(look), look.depth, surface.belief()
                     )
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
+
+    def _unchanged(self, scene: Scene | None, box: Box) -> bool:
+        """Whether a box shows what was there when the target was seen elsewhere."""
+        if scene is None:
+            return False
+        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step))
 
     # -- by look ----------------------------------------------------------------------------------
 
@@ -373,8 +376,11 @@ class Follower:
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = BySurface.outline(scene, seen)
-            shown, least = _to_side(outline, scene), outline.area
-            if _at_sides(shown, scene) & self._sides:
+            ends = _ends(outline, scene)
+            shown, least = _to_side(outline, ends, scene), outline.area
+            if self._ends is not None and (
+                (ends.left and self._ends.left) or (ends.right and self._ends.right)
+            ):
                 least = min(shown.area, self._last_box.area)
             if (
                 seen.area < NEWCOMER_AREA
@@ -435,29 +441,23 @@ def _score(look: Look) -> float:
     return float(min(max(look.ratio, 0.0), SUREST_LOOK))
 
 
-def _at_sides(box: Box, scene: Scene) -> frozenset[str]:
-    """The sides of what depth sees that a box reaches."""
-    rim, cols, step = scene.rim, scene.view.shape[1], scene.view.step
-    reached = {'left': box.x <= (1 + rim.left) * step}
-    reached['right'] = box.right >= (cols - 1 - rim.right) * step
-    return frozenset(side for side, there in reached.items() if there)
+def _ends(box: Box, scene: Scene) -> Sides:
+    """The sides at which a box reaches the end of what depth sees."""
+    b = box.over(scene.view.step)
+    return scene.rim.reached(b.x, b.y, b.right, b.bottom, scene.view)
 
 
-def _to_side(outline: Box, scene: Scene) -> Box:
+def _to_side(outline: Box, ends: Sides, scene: Scene) -> Box:
     """An outline that ends where depth does, up to the image's own end."""
-    sides = _at_sides(outline, scene)
-    left = 0.0 if 'left' in sides else outline.x
-    right = float(scene.view.shape[1] * scene.view.step) if 'right' in sides else outline.right
+    left = 0.0 if ends.left else outline.x
+    right = float(scene.view.shape[1] * scene.view.step) if ends.right else outline.right
     return Box.from_corners(left, outline.y, right, outline.bottom)
 
 
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
-    rows, cols = scene.view.shape
-    middle, step = box.scaled(0.6), scene.view.step
-    x0, x1 = (min(max(int(v / step), 0), cols) for v in (middle.x, middle.right + step))
-    y0, y1 = (min(max(int(v / step), 0), rows) for v in (middle.y, middle.bottom + step))
-    return slice(y0, y1), slice(x0, x1)
+    b = box.scaled(MIDDLE).over(scene.view.step)
+    return scene.view.part(b.x, b.y, b.right, b.bottom)
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:

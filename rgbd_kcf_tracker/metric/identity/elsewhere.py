@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_of
 
 Image = npt.NDArray[np.uint8]
 
@@ -47,14 +48,13 @@ class Elsewhere:
             image: ``(h, w, 3)`` uint8 BGR, of now.
             box: in its pixels.
         """
-        rows, cols = image.shape[:2]
-        part = _cells(box.scaled(MIDDLE), rows, cols)
+        part = _part(image, box.scaled(MIDDLE))
         now = image[part]
         for then, place in self._kept:
             if then.shape != image.shape or not now.size:
                 continue
-            elsewhere = np.ones((rows, cols), np.bool_)
-            elsewhere[_cells(place, rows, cols)] = False
+            elsewhere = np.ones(image.shape[:2], np.bool_)
+            elsewhere[_part(image, place)] = False
             there = elsewhere[part]
             if np.count_nonzero(there) <= OUTSIDE * there.size:
                 continue
@@ -64,8 +64,6 @@ class Elsewhere:
         return False
 
 
-def _cells(box: Box, rows: int, cols: int) -> tuple[slice, slice]:
+def _part(image: Image, box: Box) -> tuple[slice, slice]:
     """Rows and columns that a box covers."""
-    x0, x1 = (min(max(int(v), 0), cols) for v in (box.x, box.right + 1))
-    y0, y1 = (min(max(int(v), 0), rows) for v in (box.y, box.bottom + 1))
-    return slice(y0, y1), slice(x0, x1)
+    return part_of(image.shape, box.x, box.y, box.right, box.bottom)

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.features.optical_flow import Points, followed
 from rgbd_kcf_tracker.features.windows import resampled
 
 Image = npt.NDArray[np.uint8]
-Points = npt.NDArray[np.float32]
 Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
 SIDE, AROUND = 144, 3.0
@@ -33,8 +33,6 @@ LONGEST = 0.6
 INNER = 0.9
 """Share of the target's sides inside which corners are taken."""
 CORNERS, QUALITY, DISTANCE = 60, 0.005, 3
-FLOW_WINDOW, FLOW_LEVELS = 11, 3
-"""Pixels of the window of the flow, and halvings: together they follow 40 pixels a frame."""
 BACK = 1.0
 """Pixels between a corner and where the flow forth and back takes it."""
 LEAST_CORNERS, LEAST_SHARE = 8, 0.5
@@ -107,7 +105,8 @@ class TextureFlow:
         if corners is None or len(corners) < LEAST_CORNERS:
             return None
         window = resampled(color, self._cx, self._cy, self._side, SIDE)
-        first, second = _followed(last, cv2.cvtColor(window, cv2.COLOR_BGR2GRAY), corners)
+        now = cv2.cvtColor(window, cv2.COLOR_BGR2GRAY)
+        first, second = _forth_and_back(last, now, corners.reshape(-1, 2))
         least = max(LEAST_CORNERS, LEAST_SHARE * len(corners))
         if len(first) < least:
             return None
@@ -121,20 +120,13 @@ class TextureFlow:
         return Flow(float(dx), float(dy), growth)
 
 
-def _followed(last: Image, now: Image, corners: Points) -> tuple[Points, Points]:
+def _forth_and_back(last: Image, now: Image, corners: Points) -> tuple[Points, Points]:
     """Corners that are found again, ``(n, 2)`` each, where they were and where they are."""
-    size = (FLOW_WINDOW, FLOW_WINDOW)
-    found, there, _ = cv2.calcOpticalFlowPyrLK(
-        last, now, corners, None, winSize=size, maxLevel=FLOW_LEVELS
-    )
-    back, again, _ = cv2.calcOpticalFlowPyrLK(
-        now, last, found, None, winSize=size, maxLevel=FLOW_LEVELS
-    )
-    first, second, third = (points.reshape(-1, 2) for points in (corners, found, back))
-    good = (there > 0).ravel() & (again > 0).ravel()
-    good &= np.hypot(*(third - first).T) < BACK
-    good &= ((second > 0) & (second < SIDE - 1)).all(axis=1)
-    return first[good], second[good]
+    found, there = followed(last, now, corners)
+    back, again = followed(now, last, found)
+    good = there & again & (np.hypot(*(back - corners).T) < BACK)
+    good &= ((found > 0) & (found < SIDE - 1)).all(axis=1)
+    return corners[good], found[good]
 
 
 def _growth(first: Points, second: Points) -> float:

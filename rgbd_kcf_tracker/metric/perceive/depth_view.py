@@ -14,6 +14,17 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 
 
+def part_of(
+    shape: tuple[int, ...], left: float, top: float, right: float, bottom: float
+) -> tuple[slice, slice]:
+    """Rows and columns of what lies between these pixels, as far as it is in an image."""
+    rows, cols = shape[:2]
+    return (
+        slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
+        slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
     """Every ``step``-th pixel of a depth image.
@@ -57,11 +68,7 @@ class DepthView:
 
     def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
         """Rows and columns of what lies between these pixels, as far as it is in the view."""
-        rows, cols = self.shape
-        return (
-            slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
-            slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
-        )
+        return part_of(self.shape, left, top, right, bottom)
 
     @property
     def shape(self) -> tuple[int, int]:

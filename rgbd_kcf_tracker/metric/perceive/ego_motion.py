@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.features.optical_flow import followed
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
@@ -30,8 +31,6 @@ CHANGED_SHARE = 0.06
 the camera may have moved; sensor noise stays below, and so does one person walking."""
 CORNERS = 90
 CORNER_QUALITY, CORNER_DISTANCE = 0.01, 6
-FLOW_WINDOW, FLOW_LEVELS = 11, 3
-"""Pixels of the window of the flow, and halvings: together they follow 40 pixels a frame."""
 LEAST_CORNERS = 12
 LEAST_AGREEING = 0.4
 """Corners that must agree on a motion for it to be believed, and their share of all."""
@@ -90,13 +89,9 @@ def _told(
     )
     if corners is None or len(corners) < LEAST_CORNERS:
         return Lost()
-    window = (FLOW_WINDOW, FLOW_WINDOW)
-    found, status, _ = cv2.calcOpticalFlowPyrLK(
-        last, gray, corners, None, winSize=window, maxLevel=FLOW_LEVELS
-    )
-    good = status.reshape(-1) > 0
-    first = corners.reshape(-1, 2)[good].astype(np.float64)
-    second = found.reshape(-1, 2)[good].astype(np.float64)
+    corners = corners.reshape(-1, 2)
+    found, good = followed(last, gray, corners)
+    first, second = corners[good].astype(np.float64), found[good].astype(np.float64)
     if len(first) < LEAST_CORNERS:
         return Lost()
     still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)

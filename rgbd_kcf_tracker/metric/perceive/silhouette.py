@@ -63,6 +63,18 @@ class Rim:
             min(self.bottom, other.bottom),
         )
 
+    def reached(
+        self, left: float, top: float, right: float, bottom: float, view: DepthView
+    ) -> Sides:
+        """At which sides what lies between these pixels reaches the end of what a view sees."""
+        rows, cols = view.shape
+        return Sides(
+            left <= 1 + self.left,
+            top <= 1 + self.top,
+            right >= cols - 1 - self.right,
+            bottom >= rows - 1 - self.bottom,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Sides:
@@ -104,13 +116,7 @@ class Silhouette:
 
     def at_edge(self, view: DepthView, rim: Rim) -> bool:
         """True where it reaches the end of what the camera sees."""
-        rows, cols = view.shape
-        return (
-            self.left <= 1 + rim.left
-            or self.top <= 1 + rim.top
-            or self.cols.stop >= cols - 1 - rim.right
-            or self.rows.stop >= rows - 1 - rim.bottom
-        )
+        return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view).any
 
     def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
@@ -180,12 +186,12 @@ class Silhouette:
         z = float(depth[mask].mean())
         k = view.intrinsics
         hidden = _hidden_sides(view, left, top, mask, z)
-        height, width = view.shape
+        ends = rim.reached(left, top, left + cols, top + rows, view)
         cut = Sides(
-            hidden.left or left <= 1 + rim.left,
-            hidden.top or top <= 1 + rim.top,
-            hidden.right or left + cols >= width - 1 - rim.right,
-            hidden.bottom or top + rows >= height - 1 - rim.bottom,
+            hidden.left or ends.left,
+            hidden.top or ends.top,
+            hidden.right or ends.right,
+            hidden.bottom or ends.bottom,
         )
         metres = (
             (left - k.cx) * z / k.fx,
