@@ -9,6 +9,8 @@ plane below the camera under which (almost) nothing lies.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +19,16 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
+FloatArray = npt.NDArray[np.float64]
+
 MIN_UPRIGHT = 0.75
 """Cosine of the largest tilt between the camera's down axis and the floor's normal."""
 CAMERA_HEIGHT = (0.25, 3.5)
 """Metres the camera may stand above the floor."""
 MIN_SHARE = 0.06
 """Least share of the sampled pixels that must lie on the floor."""
+BELOW = -2.5
+"""Elevation, in units of the readings' noise, from which something lies below the floor."""
 TRIALS = 96
 SAMPLES = 600
 
@@ -77,22 +83,14 @@ class Floor:
         return (1.0 / z - self.c - self.a * u) / self.b
 
 
-def _height(planes: npt.NDArray[np.float64], k: Intrinsics) -> npt.NDArray[np.float64]:
-    """Distance of the camera from each plane, ``(n,)``; planes ``(n, 3)`` as ``a, b, c``."""
-    normal = np.stack(
-        (
-            planes[:, 0] * k.fx,
-            planes[:, 1] * k.fy,
-            planes[:, 2] + planes[:, 0] * k.cx + planes[:, 1] * k.cy,
-        ),
-        axis=1,
-    )
-    length = np.linalg.norm(normal, axis=1)
-    down = normal[:, 1] / np.maximum(length, 1e-12)
-    height = 1.0 / np.maximum(length, 1e-12)
-    good = (down > MIN_UPRIGHT) & (height > CAMERA_HEIGHT[0]) & (height < CAMERA_HEIGHT[1])
-    result: npt.NDArray[np.float64] = np.where(good, height, np.nan)
-    return result
+def _height(plane: Sequence[float], k: Intrinsics) -> float:
+    """Distance of the camera from a plane ``a, b, c``; NaN where no floor can be there."""
+    a, b, c = plane
+    across, down = a * k.fx, b * k.fy
+    length = math.hypot(across, down, c + a * k.cx + b * k.cy)
+    if length == 0 or down / length <= MIN_UPRIGHT:
+        return math.nan
+    return 1 / length if CAMERA_HEIGHT[0] < 1 / length < CAMERA_HEIGHT[1] else math.nan
 
 
 class FloorFinder:
@@ -115,24 +113,24 @@ class FloorFinder:
         if len(z) < 60:
             self._floor = None
             return None
-        points = np.stack((index % w, index // w, np.ones(len(z))), axis=1).astype(np.float64)
+        points: FloatArray = np.stack((index % w, index // w, np.ones(len(z))), axis=1)
+        # In terms of these the distance from a plane is 1 - rays @ plane, in camera heights.
+        rays: FloatArray = points * z[:, None]
         if self._floor is not None:
             f = self._floor
-            refined = self._refined(np.array([[f.a, f.b, f.c]]), points, z, view.intrinsics)
-            if refined is not None:
-                self._floor = refined
-                return refined
-        self._floor = None
+            self._floor = self._refined(np.array([f.a, f.b, f.c]), rays, z, view.intrinsics)
+            if self._floor is not None:
+                return self._floor
         if self._wait > 0:
             self._wait -= 1
             return None
-        self._floor = self._searched(points, z, view.intrinsics)
+        self._floor = self._searched(points, rays, z, view.intrinsics)
         if self._floor is None:
             self._wait = 5
         return self._floor
 
     def _searched(
-        self, points: npt.NDArray[np.float64], z: npt.NDArray[np.float64], k: Intrinsics
+        self, points: FloatArray, rays: FloatArray, z: FloatArray, k: Intrinsics
     ) -> Floor | None:
         triples = self._rng.integers(0, len(z), (TRIALS, 3))
         matrices = points[triples]
@@ -141,44 +139,42 @@ class FloorFinder:
             return None
         inverse = 1.0 / z[triples[regular]]
         planes = np.linalg.solve(matrices[regular], inverse[:, :, None])[:, :, 0]
-        heights = _height(planes, k)
+        heights = np.array([_height(plane, k) for plane in planes.tolist()])
         planes = planes[np.isfinite(heights)]
         heights = heights[np.isfinite(heights)]
         if not len(planes):
             return None
-        above = heights[:, None] * (1.0 - (planes @ points.T) * z)
-        width = 0.02 + 0.012 * z
+        above = heights[:, None] * (1.0 - planes @ rays.T)
+        width = _noise(z)
         on = (np.abs(above) < width).mean(axis=1)
-        below = (above < -2.5 * width).mean(axis=1)
+        below = (above < BELOW * width).mean(axis=1)
         score = on - 2.0 * below
         best = int(np.argmax(score))
         if score[best] < MIN_SHARE:
             return None
-        return self._refined(planes[best : best + 1], points, z, k)
+        return self._refined(planes[best], rays, z, k)
 
     def _refined(
-        self,
-        plane: npt.NDArray[np.float64],
-        points: npt.NDArray[np.float64],
-        z: npt.NDArray[np.float64],
-        k: Intrinsics,
+        self, plane: FloatArray, rays: FloatArray, z: FloatArray, k: Intrinsics
     ) -> Floor | None:
         """The plane fitted again to what lies on it, or None where too little does."""
-        width = 0.02 + 0.012 * z
+        width = _noise(z)
         for _ in range(2):
-            height = _height(plane, k)[0]
-            if not np.isfinite(height):
-                return None
-            above = height * (1.0 - (points @ plane[0]) * z)
-            on = np.abs(above) < width
-            if on.mean() < MIN_SHARE or (above < -2.5 * width).mean() > 0.5 * on.mean():
+            above = _height(plane.tolist(), k) * (1.0 - rays @ plane)
+            on = np.abs(above) < width  # nowhere where the plane is no floor
+            count = np.count_nonzero(on)
+            if count < MIN_SHARE * len(z) or np.count_nonzero(above < BELOW * width) > 0.5 * count:
                 return None
             # Weighted by depth, so that the fit is in metres rather than in inverse metres.
-            a = points[on] * z[on, None]
-            normal_matrix = a.T @ a + 1e-9 * np.eye(3)
-            plane = np.linalg.solve(normal_matrix, a.T @ np.ones(len(a)))[None, :]
-        height = _height(plane, k)[0]
-        if not np.isfinite(height):
+            a = rays[on]
+            plane = np.linalg.solve(a.T @ a + 1e-9 * np.eye(3), a.sum(axis=0))
+        height = _height(plane.tolist(), k)
+        if math.isnan(height):
             return None
-        a, b, c = (float(v) for v in plane[0])
-        return Floor(a, b, c, float(height), (c + a * k.cx + b * k.cy) * float(height))
+        a, b, c = plane.tolist()
+        return Floor(a, b, c, height, (c + a * k.cx + b * k.cy) * height)
+
+
+def _noise(z: FloatArray) -> FloatArray:
+    """Metres by which readings of the floor lie beside it, ``(n,)``."""
+    return 0.02 + 0.012 * z

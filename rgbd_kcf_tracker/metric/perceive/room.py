@@ -179,25 +179,27 @@ class Room:
         before |= open_
         farther = both & (nearer < -allowed)
         again = farther & (np.abs(depth - self._farther) <= allowed)
-        same = both & ~before & ~farther
+        same = both & ~(before | farther)
         if open_.any():
             # What is farther than who stood there, and goes on as the room, is the room.
             behind = open_ & (depth > self._front + np.float32(LEAP))
-            behind &= _mostly(same, surfaces)
-            before &= ~behind
-            open_ &= ~behind
-            left |= behind
+            if behind.any():
+                behind &= _mostly(same, surfaces)
+                before &= ~behind
+                open_ &= ~behind
+                left |= behind
             # Who passes before somebody does not take his place.
             np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
-        self.depth[same] -= np.float32(BLEND) * nearer[same]
-        self.depth[again] = depth[again]
-        self._farther = np.where(farther, depth, np.float32(0))
+        nearer *= same
+        nearer *= np.float32(BLEND)
+        self.depth -= nearer
+        fresh = valid & ~known & ~before
+        fresh |= again
+        np.copyto(self.depth, depth, where=fresh)
+        self._farther = depth * farther
         self._blind[left] = 0
-        unknown = ~known
-        fresh = unknown & valid & ~before
-        self.depth[fresh] = depth[fresh]
-        unknown &= ~valid
-        self._blind[unknown] = np.minimum(self._blind[unknown], 250) + 1
+        unseen = ~(known | valid)
+        cv2.add(self._blind, unseen.view(np.uint8), self._blind)  # stays at the highest
         self.before, self.still = before, same
         self._settle(depth, dt, allowed, somebody)
 
@@ -207,7 +209,7 @@ class Room:
         still = self.before & (np.abs(depth - self._still) <= np.float32(0.5) * allowed)
         if somebody is not None:
             still &= ~somebody
-        self._still = np.where(self.before & ~still, depth, self._still)
+        np.copyto(self._still, depth, where=self.before & ~still)
         self._still_for += np.float32(dt)
         self._still_for *= still
         settled = self._still_for > SETTLE
