@@ -19,9 +19,9 @@ Image = npt.NDArray[np.uint8]
 
 DARKEST, BRIGHTEST = 12, 243
 """Values between which a channel is neither noise nor saturated."""
-LEAST_PIXELS = 30
-"""Pixels of the room, at every eighth row and column, from which the light is told."""
-STRIDE = 8
+LEAST_PIXELS = 60
+"""Pixels of the room, at every fifth row and column, from which the light is told."""
+STRIDE = 5
 UNCHANGED = 0.02
 """Gain up to which nothing is done."""
 LARGEST_GAIN = 8.0
