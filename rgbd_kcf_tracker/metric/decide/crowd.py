@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
-from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.person import ENOUGH, Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -193,7 +193,9 @@ class Account:
         assigned = 0 if person.figure else 1
         if index >= 0:
             assigned = 0
-            if self.verdict[index] >= 0:
+            if stranger is not None and self.returned(stranger, 0.0) is person:
+                assigned = 1
+            elif self.verdict[index] >= 0:
                 assigned = 1 if self.people[self.verdict[index]] is person else -1
             for row, other in enumerate(self.people[: len(self.odds)]):
                 if other is person:
@@ -247,6 +249,26 @@ class Account:
         if other is person or other.chosen or other.number in person.met:
             return None
         return other
+
+    def returned(self, newcomer: Person, enough: float = ENOUGH) -> Person | None:
+        """Who of those that went away before a newcomer came he has turned out to be, if anybody.
+
+        Args:
+            newcomer: the newcomer.
+            enough: sightings from which that is said, counted by how much showed: a first one alone
+                seldom tells, what several say together does.
+        """
+        alike = [
+            (newcomer.resembles(person.number, enough), index)
+            for index, person in enumerate(self.people)
+            if person.number not in newcomer.met
+            and (person.chosen or person.seen_at < newcomer.first_seen)
+        ]
+        alike.sort(reverse=True)
+        (odds, index), *others = alike or [(0.0, -1)]
+        if odds < RETURN + SAME_AGAIN or (others and others[0][0] > odds - SAME_AGAIN):
+            return None
+        return self.people[index]
 
     def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
@@ -418,28 +440,16 @@ class Crowd:
         self._reunite(account)
 
     def _reunite(self, account: Account) -> None:
-        """Give newcomers the number of whom they have turned out to be.
-
-        A first sight alone seldom tells; what several say together does.
-        """
+        """Give newcomers the number of whom they have turned out to be."""
         for column, row in enumerate(account.owner):
             if row < 0 or account.people[row].chosen:
                 continue
             newcomer = account.people[row]
-            alike = [
-                (newcomer.resembles(person.number), index)
-                for index, person in enumerate(account.people)
-                if person.number not in newcomer.met
-                and (person.chosen or person.seen_at < newcomer.first_seen)
-            ]
-            alike.sort(reverse=True)
-            (odds, index), *others = alike or [(0.0, -1)]
-            if odds < RETURN + SAME_AGAIN or (others and others[0][0] > odds - SAME_AGAIN):
+            person = account.returned(newcomer)
+            if person is None or person.chosen:  # he is recognised by who follows him
                 continue
-            if account.people[index].chosen:  # who was chosen is recognised by who follows him
-                continue
-            account.people[index].become(newcomer)
-            account.owner[column] = index
+            person.become(newcomer)
+            account.owner[column] = account.people.index(person)
             if newcomer in self.people:
                 self.people.remove(newcomer)
 

@@ -118,14 +118,16 @@ class Person:
         total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
         return total / count if count > 0 else None
 
-    def resembles(self, other: int) -> float:
-        """Log-odds of looking like another, by all sightings of late; 0 after less than two.
+    def resembles(self, other: int, enough: float = ENOUGH) -> float:
+        """Log-odds of looking like another, by all sightings of late; 0 where there are too few.
 
         Sightings of one walk say little more than one of them: that two people wear the same does
         not change from frame to frame.
         """
         total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
-        return total / count * (1 + AGAIN * float(np.log2(count))) if count >= ENOUGH else 0.0
+        if count == 0 or count < enough:
+            return 0.0
+        return total / count * (1 + AGAIN * float(np.log2(max(count, 1.0))))
 
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""
