@@ -22,6 +22,9 @@ STEADY = 0.7
 """Share of that for one who has been followed for some frames and was just seen."""
 COAST = 1.2
 """Seconds for which a person goes on as before."""
+SLOW, STANDS, SWAYING = 0.25, 0.7, 0.4
+"""Metres a second below which a person stands, the probability that he goes on standing, and metres
+a second by which his next place is unknown if he does."""
 VELOCITY_TIME = 0.3
 """Seconds after which a velocity is two thirds of what the sightings since then tell."""
 RECENT = 1.5
@@ -95,7 +98,9 @@ class Person:
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ELSEWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
-        density = np.exp(-0.5 * away / variance) / (2 * np.pi * variance)
+        density = _density(away, variance)
+        if gone < COAST and self.sightings > 2 and np.hypot(*self.velocity) < SLOW:
+            density += STANDS * (_density(away, PLACE_SIGMA**2 + (SWAYING * gone) ** 2) - density)
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
 
@@ -170,3 +175,9 @@ class Person:
         self.seen_at = time
         self.sightings += 1
         self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
+
+
+def _density(squared: FloatArray, variance: float) -> FloatArray:
+    """Of a place at squared distances ``(n,)``, to the square metre, for a variance each way."""
+    density: FloatArray = np.exp(-0.5 * squared / variance) / (2 * np.pi * variance)
+    return density

@@ -28,6 +28,8 @@ camera's noise, which grows with the square of depth (Khoshelham and Elberink 20
 of outlines between depth and colour."""
 BLIND_FRAMES = 3
 """Frames without a reading after which a pixel is known to have none: a reading there is new."""
+GONE_FRAMES = 2 * BLIND_FRAMES
+"""Frames without a reading after which whatever was known of a pixel is not there any more."""
 NEAREST = 0.15
 """Metres from the camera below which nothing is seen."""
 BLEND = 0.1
@@ -198,8 +200,12 @@ class Room:
         np.copyto(self.depth, depth, where=fresh)
         self._farther = depth * farther
         self._blind[left] = 0
-        unseen = ~(known | valid)
-        cv2.add(self._blind, unseen.view(np.uint8), self._blind)  # stays at the highest
+        # What was known of a pixel that has no reading any more was somebody, who has gone.
+        self._blind *= ~both
+        np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
+        cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
+        gone = self._blind >= GONE_FRAMES
+        self.depth[gone] = self._front[gone] = 0
         self.before, self.still = before, same
         self._settle(depth, dt, allowed, somebody)
 
