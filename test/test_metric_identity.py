@@ -196,6 +196,19 @@ def test_two_sights_a_second_apart_tell_where_a_walker_will_be():
     assert ahead > where_he_was + 0.7
 
 
+def test_who_stands_is_where_he_stood_rather_than_beside_it():
+    walks, stands = (Person(i, np.array([0.0, 3.0]), 0.0) for i in (1, 2))
+    for i in range(1, 5):
+        walks.moved_to(np.array([1.0 * i, 3.0]), 1.0 * i)
+        stands.moved_to(np.array([4.0 + 0.05 * (i % 2), 3.0]), 1.0 * i)
+    margins = []
+    for one in (walks, stands):
+        there = one.expected(5.0)
+        here, beside = one.place_log_odds(np.stack((there, there + (0.8, 0.0))), 5.0)
+        margins.append(here - beside)
+    assert margins[1] > margins[0] + 0.3
+
+
 def test_the_place_says_less_the_longer_somebody_is_away():
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     places = np.array([[0.1, 3.0], [2.5, 3.0]])
@@ -238,6 +251,9 @@ def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     # More sightings say more, but by far not as many times more.
     assert 1.0 < one.resembles(7) < 2.0
     assert one.resembles(8) == 0.0
+    one.resembled(9, 2.0, 0.5, 0.0)
+    assert one.resembles(9) == 0.0, 'half a sighting is too little to go by for good'
+    assert one.resembles(9, enough=0.0) == pytest.approx(2.0)
     # What was seen long ago, when little of him showed, says no more who he is.
     for time in (20.0, 20.5, 21.0):
         one.resembled(7, -2.0, 1.0, time)
@@ -377,6 +393,27 @@ def test_a_chosen_one_comes_back_as_a_stranger_who_resembles_him():
         resemblance = stranger.resemblance(chosen.number)
         assert resemblance is not None
         assert (resemblance > 1) == same
+        watched.wait(3)
+
+
+def test_who_comes_back_is_explained_as_himself_from_the_first_sight_on_and_others_are_not():
+    watched = Watched()
+    chosen = watched.walk(-1.0, 0.6, 3.0, RED)
+    chosen.chosen = True
+
+    def hidden(account: Account):
+        return {chosen.number: None}
+
+    for _ in range(round(3 * REUNION / 0.5)):
+        watched.see(dt=0.5, targets=hidden)
+    for shirt, said in ((GREEN, {0, -1}), (RED, {1})):
+        claims = []
+        for i in range(6):
+            account = watched.see(Someone(-0.8 + 0.1 * i, 2.5, shirt), targets=hidden)
+            seen = account.sights[0].figure.seen
+            claims.append(account.claim(chosen, seen).assigned)
+        # Before, the number that he got with his first sight explained him from the second on.
+        assert set(claims) <= said
         watched.wait(3)
 
 

@@ -118,6 +118,37 @@ def test_pixels_that_somebody_left_become_room():
     assert room.depth[THING] == pytest.approx(WALL)
 
 
+@pytest.mark.parametrize('blank', [2, 8])
+def test_a_place_that_has_no_reading_any_more_was_somebody(blank: int):
+    # He stood in a doorway, beyond which depth sees nothing, before anybody was looked for.
+    room = known_room(with_thing(4.0))
+    hole = wall()
+    hole[THING] = 0.0
+    for _ in range(blank):  # where there never was a reading, a few are missing for a moment
+        see(room, hole, 0.1, None)
+    see(room, with_thing(4.0), 0.1, None)
+    assert room.before[THING].all() == (blank > 2)
+
+
+def test_a_wall_that_was_not_seen_for_a_while_is_still_the_room():
+    room = known_room(wall())
+    blank = wall()
+    blank[THING] = 0.0
+    for _ in range(10):
+        see(room, blank, 0.1, None)
+    see(room, wall(), 0.1, None)
+    assert not room.before.any()
+
+
+def test_who_comes_farther_off_where_another_has_gone_out_of_sight_is_before_the_room():
+    hole = wall()
+    hole[THING] = 0.0
+    room = known_room(hole)
+    for seen in [hole] * 10 + [with_thing(1.5)] * 3 + [hole] * 10 + [with_thing(4.0)] * 3:
+        see(room, seen, 0.1, None)
+    assert room.before[THING].all()
+
+
 def test_pixels_that_turn_out_to_be_somebody_are_taken_out_of_the_room():
     room = known_room(with_thing())
     claimed = NOBODY.copy()
