@@ -49,6 +49,7 @@ from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, p
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 
@@ -686,6 +687,52 @@ def test_what_was_there_while_the_target_was_elsewhere_is_not_it(before: bool):
     assert (track.box is None) == before
     if track.box is not None:
         assert track.box.iou(ahead.box) > 0.8
+
+
+def test_a_look_is_not_taken_where_depth_shows_the_room():
+    """Ahead of the target, where depth is silent of a part, a picture of it hangs on the wall."""
+    ahead = Someone(0.75, 3.0)
+    silent = dataclasses.replace(ahead.box, width=0.25 * ahead.box.width)
+    tracker = create_tracker('metric')
+    for i in range(16):
+        one = Someone(-0.6 + 0.08 * i, 3.0)
+        color, depth = images([ahead] if i > 12 else [])
+        depth[:] = WALL
+        holed(depth, silent)
+        if i < 13:
+            walking, near = images([one])
+            color[near < WALL], depth[near < WALL] = walking[near < WALL], one.z
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert (track.box is not None) == (i < 13)
+
+
+def test_what_is_no_figure_is_not_the_target_for_good_after_an_absence(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    targets = MetricTargets(MetricParameters())
+    one = Someone(-0.3, 3.0)
+    targets.update(picture([], 0.0))
+    for i in range(8):
+        last = 0.1 * (i + 1)
+        frame = picture([dataclasses.replace(one, x=-0.3 + 0.05 * i)], last)
+        if i == 0:
+            number = targets.add(frame, one.box)
+        else:
+            targets.update(frame)
+    person = targets.person(number)
+    assert person is not None
+    seen_at = person.seen_at
+    for i in range(6):
+        targets.update(picture([], last + 0.5 * (i + 1)))
+    # As where a desk leaves a piece of him that is too small for a figure.
+    monkeypatch.setattr(Account, 'sight_of', lambda *_: -1)
+    boxes = 0
+    for i in range(5):
+        track = targets.update(picture([dataclasses.replace(one, x=0.4)], last + 3.1 + 0.1 * i))
+        boxes += track[number].box is not None
+    assert boxes, 'it is published with its probability'
+    assert person.seen_at == seen_at, 'and nothing is learned from it'
 
 
 def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):

@@ -195,11 +195,12 @@ class Follower:
             return self._glance(frame, None, view, dt, surface)
         found = surface.step(account, frame, dt)
         if found is None:
-            return self._glance(frame, account.scene, view, dt, surface)
+            return self._glance(frame, account, view, dt, surface)
         if surface.hidden_for > REUNION and self.person is not None:
             index = account.sight_of(found.seen)
             stranger = account.stranger(self.person, index)
-            new = index >= 0 and account.owner[index] < 0
+            # A part of somebody, where all of the target is a figure, tells not for good who it is.
+            new = account.owner[index] < 0 if index >= 0 else self.person.figure
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
@@ -259,18 +260,19 @@ class Follower:
     def _glance(
         self,
         frame: Frame,
-        scene: Scene | None,
+        account: Account | None,
         view: DepthView | None,
         dt: float,
         surface: BySurface,
     ) -> Track:
         """Where depth shows nothing of the target, see whether its look is where it should be."""
+        scene = None if account is None else account.scene
         if self._look is not None and view is not None:
             box = surface.expected_box(view)
             blind = scene is None or surface.without_depth(scene) > BLIND
             if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
-                if look is not None and not self._unchanged(scene, look.box):
+                if look is not None and not self._stood_there(account, look.box):
                     surface.seen_elsewhere(view, look.box)
                     return self._tracked(
                         frame, look.box, _score(look), look.depth, surface.belief()
@@ -278,11 +280,14 @@ class Follower:
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
-    def _unchanged(self, scene: Scene | None, box: Box) -> bool:
-        """Whether a box shows what was there when the target was seen elsewhere."""
-        if scene is None:
+    def _stood_there(self, account: Account | None, box: Box) -> bool:
+        """Whether a box shows what was there when the target was seen elsewhere, or the room."""
+        if account is None:
             return False
-        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step))
+        scene = account.scene
+        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
+            self.person is not None and self.person.mobile and _room_share(account, box) > STANDING
+        )
 
     # -- by look ----------------------------------------------------------------------------------
 

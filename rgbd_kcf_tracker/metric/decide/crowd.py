@@ -193,8 +193,8 @@ class Account:
         assigned = 0 if person.figure else 1
         if index >= 0:
             assigned = 0
-            if stranger is not None and self.returned(stranger, 0.0) is person:
-                assigned = 1
+            if stranger is not None and self.likest(stranger) is person:
+                assigned = int(stranger.resembles(person.number, 0.0) > RETURN + SAME_AGAIN)
             elif self.verdict[index] >= 0:
                 assigned = 1 if self.people[self.verdict[index]] is person else -1
             for row, other in enumerate(self.people[: len(self.odds)]):
@@ -250,8 +250,8 @@ class Account:
             return None
         return other
 
-    def returned(self, newcomer: Person, enough: float = ENOUGH) -> Person | None:
-        """Who of those that went away before a newcomer came he has turned out to be, if anybody.
+    def likest(self, newcomer: Person, enough: float = 0.0) -> Person | None:
+        """Who of those that went away before a newcomer came he seems to be, if one of them.
 
         Args:
             newcomer: the newcomer.
@@ -266,7 +266,7 @@ class Account:
         ]
         alike.sort(reverse=True)
         (odds, index), *others = alike or [(0.0, -1)]
-        if odds < RETURN + SAME_AGAIN or (others and others[0][0] > odds - SAME_AGAIN):
+        if odds < RETURN or (others and others[0][0] > odds - SAME_AGAIN):
             return None
         return self.people[index]
 
@@ -445,8 +445,10 @@ class Crowd:
             if row < 0 or account.people[row].chosen:
                 continue
             newcomer = account.people[row]
-            person = account.returned(newcomer)
+            person = account.likest(newcomer, ENOUGH)
             if person is None or person.chosen:  # he is recognised by who follows him
+                continue
+            if newcomer.resembles(person.number) < RETURN + SAME_AGAIN:
                 continue
             person.become(newcomer)
             account.owner[column] = account.people.index(person)
