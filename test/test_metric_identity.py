@@ -205,7 +205,8 @@ def test_who_stands_is_where_he_stood_rather_than_beside_it():
     margins = []
     for one in (walks, stands):
         there = one.expected(5.0)
-        here, beside = one.place_log_odds(np.stack((there, there + (0.8, 0.0))), 5.0)
+        beside = there + np.array([0.8, 0.0])
+        here, beside = one.place_log_odds(np.stack((there, beside)), 5.0)
         margins.append(here - beside)
     assert margins[1] > margins[0] + 0.3
 
