@@ -21,7 +21,7 @@ waits for it: a tenth of Python's default (docs/live.md)."""
 def main(arguments: list[str] | None = None) -> int:
     """Run the tracker node until SIGINT or SIGTERM."""
     stop = Stop()  # first of all: what follows takes a second
-    from rgbd_kcf_tracker.live.memory import keep_large_blocks
+    from rgbd_kcf_tracker.live.memory import keep_large_blocks, set_objects_aside
     from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
@@ -45,6 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     def live(executor: Executor, node: TrackerNode) -> None:
         if node.settings.autostart:
             node.autostart()
+        set_objects_aside()
         spin(executor, node, stop.is_set)
 
     return run(parser, TrackerNode, live, stop, arguments)
