@@ -405,15 +405,31 @@ def test_pieces_at_other_depths_or_beside_are_other_figures():
 
 
 @pytest.mark.parametrize('expected', [NONE_EXPECTED, np.array([[-0.25, 3.0], [0.25, 3.0]])])
-def test_two_people_who_touch_are_parted(expected: np.ndarray):
-    # Their trunks, 0.46 m wide, overlap by a pixel; their heads do not.
-    people = [Someone(-0.225, 3.0), Someone(0.225, 3.0)]
+@pytest.mark.parametrize('half', [0.225, 0.205])
+def test_two_people_who_touch_are_parted(expected: np.ndarray, half: float):
+    # Their trunks, 0.46 m wide, overlap by a pixel or two; their heads do not.
+    people = [Someone(-half, 3.0), Someone(half, 3.0)]
     figures = find_figures(scene_of(people), expected)
     assert len(figures) == 2
     assert all(figure.parted for figure in figures)
     found = sorted(figures, key=lambda figure: figure.place[0])
     for figure, one in zip(found, people, strict=True):
         assert outline(figure.seen).iou(one.box) > 0.85
+
+
+def test_somebody_who_waves_is_one():
+    one = Someone(0.0, 3.0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    for i in range(6):
+        color, depth = images([one] if i > 4 else [])
+        if i > 4:
+            left, top = round(0.23 / 3.0 * CAMERA.fx + CAMERA.cx), int(one.box.y)
+            depth[top + 15 : top + 22, left - 1 : left + 18] = 3.0  # the arm
+            depth[top : top + 22, left + 12 : left + 18] = 3.0  # and the hand beside the head
+        scene = reader.read(Frame(color, depth, round(1e8 * i), CAMERA), 0.1)
+    assert scene is not None
+    (figure,) = find_figures(scene, NONE_EXPECTED)
+    assert outline(figure.seen).iou(one.box) > 0.6
 
 
 def test_what_is_too_small_for_anybody_is_no_figure():

@@ -41,6 +41,8 @@ WIDEST, TALLEST = 0.9, 2.2
 """Metres of a person with arms half spread, and of a tall one."""
 BREADTH = 0.4
 """Metres between the heads of two people side by side, at the least."""
+BROAD = BREADTH + 0.25
+"""Metres from which a figure may be two people: those, and half a shoulder's width on each side."""
 VALLEY = 0.08
 """Metres by which the outline must fall between two heads."""
 HEAD_BELOW = 0.5
@@ -175,7 +177,7 @@ def _parted(
             inside &= (seeds[:, 1] > near - 0.3) & (seeds[:, 1] < far + 0.3)
         seeds = seeds[inside]
     if len(seeds) < 2:
-        if cols * z / k.fx < WIDEST:
+        if cols * z / k.fx < BROAD:
             return [(left, top, mask)]
         seeds = _heads(mask, depth, ahead, columns, top - k.cy, k.fx, k.fy)
         if len(seeds) < 2:
