@@ -14,7 +14,13 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
-from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, Looks, View, similarity
+from rgbd_kcf_tracker.metric.identity.gallery import (
+    ALL_SIDES,
+    WHOLE_AREA,
+    Looks,
+    View,
+    similarity,
+)
 from rgbd_kcf_tracker.metric.identity.person import ENOUGH, Person
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
@@ -514,7 +520,9 @@ class Crowd:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted
         headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
-        whole = seen.area > WHOLE and headed and alone
+        # Who comes in beside somebody at the image's side, or behind him, may be one figure with him.
+        apart = not (seen.cut.left or seen.cut.right) or len(person.gallery.views) <= ALL_SIDES
+        whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
             person.gallery.learn(view)
 
