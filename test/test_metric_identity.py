@@ -419,6 +419,18 @@ def test_who_comes_back_is_explained_as_himself_from_the_first_sight_on_and_othe
         watched.wait(3)
 
 
+@pytest.mark.parametrize(('seconds', 'possible'), [(0.4, False), (2.0, True)])
+def test_nobody_is_who_cannot_have_walked_there(seconds: float, possible: bool):
+    watched = Watched()
+    one = watched.walk(-1.2, -0.6, 3.0, RED)
+    watched.see(dt=seconds - 0.1)
+    account = watched.see(Someone(1.6, 4.0, RED))
+    if possible:
+        assert who(account, 0) is one or one.number not in who(account, 0).met
+    else:
+        assert one.number in who(account, 0).met
+
+
 def test_who_comes_back_is_not_taken_for_one_who_was_seen_beside_him():
     watched = Watched()
     account, columns = watched.beside(RED, DARK_RED)
@@ -629,7 +641,10 @@ def test_a_target_that_may_be_his_twin_has_not_met_him():
     target = targets.metric.person(number)
     assert target is not None
     assert target.place[0] == pytest.approx(nearer.x, abs=0.05)
-    assert not target.met
+    account = targets.metric.account
+    assert account is not None
+    twin = max(range(len(account.sights)), key=lambda c: account.sights[c].figure.place[0])
+    assert account.people[account.owner[twin]].number not in target.met
 
 
 def holed(depth: np.ndarray, box: Box) -> None:

@@ -379,6 +379,8 @@ class Follower:
             row = account.owner[column]
             if row >= 0 and account.people[row].first_seen <= self._since:
                 continue
+            if sight.figure.parted:  # where it ends is a guess
+                continue
             seen, scene = sight.figure.seen, account.scene
             outline = BySurface.outline(scene, seen)
             ends = _ends(outline, scene)

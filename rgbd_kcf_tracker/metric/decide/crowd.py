@@ -437,6 +437,10 @@ class Crowd:
                 account.owner[column] = len(people)
                 newcomer = self.welcome(sight.figure.place, time)
                 newcomer.entered = sight.figure.seen.at_edge(account.scene.view, account.scene.rim)
+                for other in people if account.scene.motion is None else ():
+                    if other.seen_at < time and other.out_of_reach(newcomer.place, time):
+                        other.met.add(newcomer.number)
+                        newcomer.met.add(other.number)
                 people.append(newcomer)
                 self._see(account, len(people) - 1, sight.figure.seen, column)
                 self._compare(account, len(people) - 1, column)
@@ -520,7 +524,7 @@ class Crowd:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted
         headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
-        # Who comes in beside somebody at the image's side, or behind him, may be one figure with him.
+        # Who comes in right before somebody at the image's side may be one figure with him.
         apart = not (seen.cut.left or seen.cut.right) or len(person.gallery.views) <= ALL_SIDES
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:

@@ -31,6 +31,9 @@ RECENT = 1.5
 """Seconds between two sightings that tell a velocity."""
 ROOM_AREA = 16.0
 """Square metres of floor that a camera sees: a stranger may be anywhere in it."""
+FASTEST, MISPLACED = 3.0, 0.8
+"""Metres a second at which nobody walks, and metres by which the places of two parts of one person
+differ."""
 FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
 ENOUGH = 1.5
@@ -64,7 +67,8 @@ class Person:
         last: the silhouette of the last sight, None where the camera has moved since.
         upright: whether it ever had the shape of a person.
         figure: whether it was a figure when it was last seen, and not a thing too small for one.
-        met: numbers of those who were seen at the same time, and so are surely somebody else.
+        met: numbers of those who were seen at the same time, or too far off for him to have walked
+            there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
     """
 
@@ -103,6 +107,11 @@ class Person:
             density += STANDS * (_density(away, PLACE_SIGMA**2 + (SWAYING * gone) ** 2) - density)
         odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
         return odds
+
+    def out_of_reach(self, place: FloatArray, time: float) -> bool:
+        """Whether it cannot have got to ``place``, ``(2,)`` metres, since it was last seen."""
+        away = float(np.hypot(*(place - self.place)))
+        return away > MISPLACED + FASTEST * (time - self.seen_at)
 
     def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
         """Take log-odds of a sighting of this one to look like another, who is not in view.
