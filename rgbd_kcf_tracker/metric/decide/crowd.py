@@ -524,7 +524,7 @@ class Crowd:
             person.gallery.learn_height(view.top)
         alone = index < 0 or not account.sights[index].figure.parted
         headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
-        # Who comes in right before somebody at the image's side may be one figure with him.
+        # Where something nearer cuts somebody off, some of his pixels may be another's.
         apart = not (seen.cut.left or seen.cut.right) or len(person.gallery.views) <= ALL_SIDES
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
