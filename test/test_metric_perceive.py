@@ -130,14 +130,24 @@ def test_a_place_that_has_no_reading_any_more_was_somebody(blank: int):
     assert room.before[THING].all() == (blank > 2)
 
 
-def test_a_wall_that_was_not_seen_for_a_while_is_still_the_room():
+@pytest.mark.parametrize('share', [0.2, 0.6, 1.0])
+def test_a_wall_that_was_not_seen_for_a_while_is_still_the_room(share: float):
+    # Somebody who is too near for a reading, or a camera that sends empty images for a moment.
     room = known_room(wall())
     blank = wall()
-    blank[THING] = 0.0
+    blank[:, : round(share * COLS)] = 0.0
     for _ in range(10):
         see(room, blank, 0.1, None)
     see(room, wall(), 0.1, None)
     assert not room.before.any()
+
+
+def test_a_camera_that_begins_with_empty_images_shows_a_room_and_nobody():
+    room = known_room(np.zeros((ROWS, COLS), np.float32))
+    for _ in range(3):
+        see(room, wall(), 0.1, None)
+    assert not room.before.any()
+    assert (room.depth == WALL).all()
 
 
 def test_who_comes_farther_off_where_another_has_gone_out_of_sight_is_before_the_room():

@@ -37,7 +37,8 @@ BLEND = 0.1
 SETTLE = 3.0
 """Seconds for which something that is nobody's must have stood still to become part of the room."""
 AGREEING = 0.5
-"""Share of readings where they were from which the camera stands where it stood."""
+"""Share of readings where they were from which the camera stands where it stood, and of the room
+that has readings from which a view tells what has none any more."""
 MOST = 0.5
 """Share of a surface that is room from which all of it is."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
@@ -200,12 +201,14 @@ class Room:
         np.copyto(self.depth, depth, where=fresh)
         self._farther = depth * farther
         self._blind[left] = 0
-        # What was known of a pixel that has no reading any more was somebody, who has gone.
         self._blind *= ~both
         np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
-        cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
-        gone = self._blind >= GONE_FRAMES
-        self.depth[gone] = self._front[gone] = 0
+        # A view of which most is missing says nothing of the place.
+        if valid.any() and np.count_nonzero(both) >= AGREEING * np.count_nonzero(known):
+            cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
+            # What was known of a pixel that has no reading any more was somebody, who has gone.
+            gone = self._blind >= GONE_FRAMES
+            self.depth[gone] = self._front[gone] = 0
         self.before, self.still = before, same
         self._settle(depth, dt, allowed, somebody)
 
