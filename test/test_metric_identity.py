@@ -31,7 +31,9 @@ from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.gallery import (
+    ALL_SIDES,
     MOST_VIEWS,
     SLICES,
     SUREST_OTHER,
@@ -148,18 +150,18 @@ def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
     gallery = Gallery()
     assert gallery.log_odds(look(RED)) == 0.0
     first = look(RED)
-    gallery.learn(first)
-    gallery.learn(look(RED))
+    gallery.learn(first, 0.0)
+    gallery.learn(look(RED), 1.0)
     assert len(gallery.views) == 1, 'the same view again adds nothing'
     assert gallery.log_odds(look(GREEN, GREY)) < 0 < gallery.log_odds(look(RED))
-    gallery.learn(look(BLUE, GREY))
+    gallery.learn(look(BLUE, GREY), 2.0)
     assert gallery.log_odds(look(BLUE, GREY)) > 0, 'the other side of the jacket'
     hues = cv2.cvtColor(
         np.array([[[12 * i, 220, 200] for i in range(15)]], np.uint8), cv2.COLOR_HSV2BGR
     )[0]
     for shirt in hues:
         for trousers in (BLACK, tuple(int(c) for c in hues[7]), (200, 200, 200)):
-            gallery.learn(look(tuple(int(c) for c in shirt), trousers))
+            gallery.learn(look(tuple(int(c) for c in shirt), trousers), 3.0)
     assert len(gallery.views) == MOST_VIEWS
     assert gallery.views[0] is first
     assert gallery.looks is not None
@@ -169,12 +171,34 @@ def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
 def test_the_height_of_a_gallery_is_a_median_of_the_newest():
     gallery = Gallery()
     assert gallery.top is None
-    for top in [1.1, 1.1, *[1.8] * 40]:
-        gallery.learn_height(top)
-    assert gallery.top == pytest.approx(1.8)
-    for _ in range(40):
-        gallery.learn_height(1.5)
+    for time, top in enumerate([1.1, 1.1, *[1.8] * 40, *[1.5] * 40]):
+        gallery.learn_height(top, time)
+        if time == 41:
+            assert gallery.top == pytest.approx(1.8)
     assert gallery.top == pytest.approx(1.5)
+
+
+def test_what_a_gallery_learned_of_somebody_else_is_taken_back_and_given_to_him():
+    gallery, other = Gallery(), Gallery()
+    for time, shirt, top in ((0.0, RED, 1.6), (1.0, BLUE, 1.6), (2.0, GREEN, 1.9)):
+        gallery.learn(look(shirt), time)
+        gallery.learn_height(top, time)
+    green = look(GREEN)
+    assert gallery.looks is not None
+    alike = similarity(green, gallery.looks)
+    before = gallery.log_odds_before(2.0, green, alike)
+    assert before is not None
+    assert before < 0 < gallery.log_odds(green)
+    assert gallery.log_odds_before(0.0, green, alike) is None
+
+    other.take(gallery.taken_back(2.0))
+    assert len(gallery.views) == 2
+    assert gallery.log_odds(green) == pytest.approx(before)
+    assert gallery.top == pytest.approx(1.6)
+    assert len(other.views) == 1
+    assert other.log_odds(green) > 0
+    assert other.top == pytest.approx(1.9)
+    assert Gallery().taken_back(0.0).looks is None
 
 
 # -- one person -----------------------------------------------------------------------------------
@@ -315,6 +339,12 @@ class Watched:
     def wait(self, seconds: float) -> None:
         for _ in range(round(seconds / 0.5)):
             self.see(dt=0.5)
+
+
+def know_more(person: Person, views: int) -> None:
+    """He was seen from some more sides, each of another colour."""
+    for shirt in ((200, 60, 60), (60, 200, 200), (200, 60, 200), (60, 120, 240))[:views]:
+        person.gallery.learn(look(shirt, shirt), 0.0)
 
 
 def who(account: Account, column: int) -> Person:
@@ -465,9 +495,7 @@ def test_nothing_but_the_place_is_learned_of_who_may_be_somebody_else(sure: bool
 def test_who_is_cut_off_at_a_side_is_not_learned_once_he_is_known(views: int, learned: bool):
     watched = Watched()
     one = watched.walk(-1.0, 0.0, 3.0, RED)
-    for _ in range(views):
-        one.gallery.views.append(one.gallery.views[0])
-    one.gallery.looks = Looks.of(one.gallery.views)
+    know_more(one, views)
     known = len(one.gallery.views)
     for _ in range(3):
         watched.see(Someone(0.0, 3.0, DARK_RED, GREY), Someone(0.3, 2.4, BLUE))
@@ -490,6 +518,78 @@ def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
     assert wrong.rival > wrong.mine
     assert account.probability(account.people.index(one), columns[0]) > 0.9
     assert account.probability(account.people.index(one), columns[1]) < 0.1
+
+
+@pytest.mark.parametrize('away', [True, False])
+def test_a_view_that_is_rather_one_of_somebody_who_is_away_is_not_learned(away: bool):
+    watched = Watched()
+    one = watched.walk(-1.0, 0.0, 3.0, RED)
+    know_more(one, ALL_SIDES)
+    if away:
+        other = watched.crowd.welcome(np.array([2.0, 6.0]), watched.time - 0.5)
+        other.gallery.learn(look(RED, GREY), watched.time - 0.5)
+    known = len(one.gallery.views)
+    for _ in range(3):  # he is where he was, and looks as the other one did
+        account = watched.see(Someone(0.0, 3.0, RED, GREY))
+        assert who(account, 0) is one
+    assert (len(one.gallery.views) > known) == (not away)
+
+
+def met(number: int, place: tuple[float, float], seen: View, learned: View | None, column: int):
+    """Somebody who is seen now, and who was known by one view long ago."""
+    person = Person(number, np.array(place), 0.0)
+    if learned is not None:
+        person.gallery.learn(learned, 0.0)
+    views = slice(column, column + 1) if learned is not None else slice(0, 0)
+    return Followed(person, person.place, seen, column, views)
+
+
+@pytest.mark.parametrize(
+    ('apart', 'seen', 'known', 'mixed_up'),
+    [
+        (0.5, (RED, GREEN), (GREEN, RED), True),
+        (0.5, (RED, GREEN), (GREEN, None), True),  # the other one has just come
+        (0.5, (RED, GREEN), (RED, GREEN), False),
+        (0.5, (RED, RED), (RED, RED), False),  # twins
+        (0.5, (BLUE, GREEN), (GREY, None), False),  # turned round, and a stranger beside him
+        (0.5, (RED, GREEN), (None, None), False),
+        (3.0, (RED, GREEN), (GREEN, RED), False),  # too far apart
+    ],
+)
+def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen, known, mixed_up):
+    views = [look(shirt, shirt) for shirt in seen]
+    learned = [None if shirt is None else look(shirt, shirt) for shirt in known]
+    here = [
+        met(number, (number * apart, 3.0), views[number], learned[number], number)
+        for number in range(2)
+    ]
+    stacked = [view for view in learned if view is not None]
+    alike = np.zeros((0, 2))
+    if stacked:
+        alike = np.stack([similarity(view, Looks.of(stacked)) for view in views], axis=1)
+    watch = MixUps()
+    found = [watch.watch(here, alike, 10.0 + 0.1 * i) for i in range(8)]
+    assert found[0] is None, 'one sighting is too little'
+    assert any(found) == mixed_up
+    if mixed_up:
+        first = next(each for each in found if each is not None)
+        assert {first.first, first.second} == {one.person for one in here}
+        assert first.since == pytest.approx(9.0)
+
+
+def test_those_who_were_taken_for_one_another_get_their_numbers_back():
+    watched = Watched()
+    account, columns = watched.beside(RED, GREEN)
+    red, green = (who(account, c) for c in columns)
+    red.exchange(green, np.inf)  # as where one passes behind the other
+    people = Someone(-0.45, 3.0, RED), Someone(0.5, 3.0, GREEN)
+    account = watched.see(*people)
+    assert who(account, int(np.argmin([s.figure.place[0] for s in account.sights]))) is green
+    for _ in range(6):
+        account = watched.see(*people)
+    assert who(account, int(np.argmin([s.figure.place[0] for s in account.sights]))) is red
+    assert red.gallery.log_odds(look(GREEN)) < 0 < red.gallery.log_odds(look(RED))
+    assert green.gallery.log_odds(look(RED)) < 0 < green.gallery.log_odds(look(GREEN))
 
 
 def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
@@ -518,6 +618,19 @@ def test_surface_of_a_box_is_the_one_it_is_drawn_about():
         assert seen is not None
         assert BySurface.outline(account.scene, seen).iou(one.box) > 0.9
     assert BySurface.surface_of(account, Box(5, 5, 20, 20)) is None
+
+
+@pytest.mark.parametrize(
+    ('left', 'wide', 'taken'), [(-1.0, 2.3, True), (-2.0, 3.3, False), (0.4, 1.2, False)]
+)
+def test_a_figure_that_lies_in_the_box_is_the_target_though_limbs_are_missing(left, wide, taken):
+    watched = Watched()
+    one = Someone(0.0, 3.0, RED)
+    account = watched.see(one)
+    x, y, width, height = one.box.as_tuple()
+    drawn = Box(x + left * width, y, wide * width, height)
+    assert one.box.iou(drawn) < 0.5
+    assert (BySurface.surface_of(account, drawn) is not None) == taken
 
 
 def test_what_sticks_out_of_the_given_box_is_not_the_target():

@@ -36,6 +36,8 @@ FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target."""
+PART_IOU, INSIDE = 0.35, 0.9
+"""The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
 LEAST_FILL = 0.5
 """Share of the given box that a surface fills of which the box shows only a part."""
 SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
@@ -125,10 +127,9 @@ class BySurface:
     def surface_of(account: Account, box: Box) -> Silhouette | None:
         """The figure or surface that a box of the image is drawn about, None where none fits."""
         scene = account.scene
-        figures = [sight.figure.seen for sight in account.sights]
-        overlaps = [BySurface.outline(scene, seen).iou(box) for seen in figures]
-        if figures and max(overlaps) >= LOCK_IOU:
-            return BySurface._within(scene, figures[int(np.argmax(overlaps))], box)
+        figure = BySurface._figure_of(account, box)
+        if figure is not None:
+            return BySurface._within(scene, figure, box)
         step = scene.view.step
         rows, cols = scene.view.shape
         x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
@@ -157,6 +158,18 @@ class BySurface:
             if BySurface.outline(scene, part).iou(box) >= LOCK_IOU:
                 return part
         return BySurface._scattered(scene, box)
+
+    @staticmethod
+    def _figure_of(account: Account, box: Box) -> Silhouette | None:
+        """The figure that a box is drawn about, of which limbs may be missing."""
+        figures = [sight.figure.seen for sight in account.sights]
+        if not figures:
+            return None
+        outlines = [BySurface.outline(account.scene, seen) for seen in figures]
+        overlaps = [outline.iou(box) for outline in outlines]
+        best = int(np.argmax(overlaps))
+        inside = box.intersection(outlines[best]) > INSIDE * outlines[best].area
+        return figures[best] if overlaps[best] >= (PART_IOU if inside else LOCK_IOU) else None
 
     @staticmethod
     def _scattered(scene: Scene, box: Box) -> Silhouette | None:

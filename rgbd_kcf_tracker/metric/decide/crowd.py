@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
@@ -21,7 +22,8 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     View,
     similarity,
 )
-from rgbd_kcf_tracker.metric.identity.person import ENOUGH, Person
+from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -299,6 +301,7 @@ class Crowd:
         self.time = 0.0
         self._next = 1
         self._frames = 0
+        self._mix_ups = MixUps()
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
@@ -330,6 +333,7 @@ class Crowd:
         self.time = time
         self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
         if isinstance(scene.motion, Lost):
+            self._mix_ups = MixUps()
             for person in self.people:
                 person.mobile, person.last = False, None
         if isinstance(scene.motion, Pose):
@@ -338,8 +342,22 @@ class Crowd:
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
+        account, alike = self._explained(scene, sights, time)
+        mixed_up = self._mix_ups.watch(self._followed(account), alike, time)
+        if mixed_up is not None:
+            mixed_up.first.exchange(mixed_up.second, mixed_up.since)
+            account, _ = self._explained(scene, sights, time)
+        for column, row in enumerate(account.owner):
+            if row >= 0:
+                self._compare(account, row, column)
+        return account
+
+    def _explained(
+        self, scene: Scene, sights: list[Sight], time: float
+    ) -> tuple[Account, Likeness]:
+        """The account of a frame, and the likeness of each sight to each known view, ``(v, n)``."""
+        odds, looks, alike = self._odds(sights, time)
         settled = self._frames > SETTLED
-        odds, looks = self._odds(sights, time)
         account = Account(scene, time, sights, list(self.people), odds, looks, settled)
         account.verdict = _assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
@@ -354,10 +372,22 @@ class Crowd:
                     met = [person.number in self.people[row].met for person in self.people]
                     odds_of_here[met, column] = NEW - 1
             account.owner = _assigned(odds_of_here, len(sights))
-        for column, row in enumerate(account.owner):
-            if row >= 0:
-                self._compare(account, row, column)
-        return account
+        return account, alike
+
+    def _followed(self, account: Account) -> list[Followed]:
+        """Those in view who are known, for :class:`MixUps`."""
+        ends = np.cumsum([len(person.gallery.views) for person in account.people]).tolist()
+        return [
+            Followed(
+                account.people[row],
+                account.sights[column].figure.place,
+                account.sights[column].view,
+                column,
+                slice(ends[row] - len(account.people[row].gallery.views), ends[row]),
+            )
+            for column, row in enumerate(account.owner)
+            if row >= 0
+        ]
 
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
@@ -374,28 +404,32 @@ class Crowd:
                 look = float(account.looks[other, column])
                 newcomer.resembled(person.number, look, shows, account.time)
 
-    def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray]:
+    def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray, Likeness]:
         odds = np.zeros((len(self.people), len(sights)))
         looks = np.zeros_like(odds)
+        alike = np.zeros((0, len(sights)), np.float32)
         if not odds.size:
-            return odds, looks
-        places = np.stack([s.figure.place for s in sights])
+            return odds, looks, alike
         known = [p.gallery.looks for p in self.people if p.gallery.looks is not None]
-        everyone = Looks.joined(known) if known else None
-        starts = np.cumsum([0] + [len(each) for each in known[:-1]])
-        for column, sight in enumerate(sights):
-            best = []
-            if everyone is not None:
-                best = np.maximum.reduceat(similarity(sight.view, everyone), starts).tolist()
-            for row, person in enumerate(self.people):
-                alike = best.pop(0) if person.gallery.looks is not None else None
-                looks[row, column] = person.gallery.log_odds(sight.view, alike)
+        best: list[list[float]] = []
+        if known:
+            everyone = Looks.joined(known)
+            alike = np.stack([similarity(sight.view, everyone) for sight in sights], axis=1)
+            starts = np.cumsum([0] + [len(each) for each in known[:-1]])
+            best = np.maximum.reduceat(alike, starts, axis=0).tolist()
+        rows = iter(best)
+        places = np.stack([s.figure.place for s in sights])
+        for row, person in enumerate(self.people):
+            likeness = next(rows) if person.gallery.looks is not None else None
+            for column, sight in enumerate(sights):
+                most = None if likeness is None else likeness[column]
+                looks[row, column] = person.gallery.log_odds(sight.view, most)
         for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
             if not person.chosen:
                 odds[row] -= RETURN * (1 - float(np.exp((person.seen_at - time) / GONE)))
         odds += looks
-        return odds, looks
+        return odds, looks, alike
 
     def learn(
         self,
@@ -510,10 +544,14 @@ class Crowd:
             before = account.scene.before[seen.rows, seen.cols][seen.mask]
             person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
+        all_sides = len(person.gallery.views) > ALL_SIDES
         if index >= 0 and row < len(account.odds):
-            odds = account.odds[:, index].tolist()
+            odds, looks = account.odds[:, index].tolist(), account.looks[:, index].tolist()
             rival = max([0.0, *odds[:row], *odds[row + 1 :]])
-            if odds[row] - rival < SURE:
+            # His place may say that it is he, and his look that it is one who is not in view.
+            here = {*account.owner, row}
+            liker = max([0.0, *(look for n, look in enumerate(looks) if n not in here)])
+            if odds[row] - rival < SURE or (all_sides and liker - looks[row] > SURE):
                 return
         person.upright = (
             person.upright
@@ -521,14 +559,14 @@ class Crowd:
             or upright(seen, scene.view.intrinsics, view.top)
         )
         if view.top is not None and view.top > 1.2:
-            person.gallery.learn_height(view.top)
+            person.gallery.learn_height(view.top, account.time)
         alone = index < 0 or not account.sights[index].figure.parted
         headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
         # Where something nearer cuts somebody off, some of his pixels may be another's.
-        apart = not (seen.cut.left or seen.cut.right) or len(person.gallery.views) <= ALL_SIDES
+        apart = not (all_sides and (seen.cut.left or seen.cut.right))
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
-            person.gallery.learn(view)
+            person.gallery.learn(view, account.time)
 
 
 def _assigned(odds: FloatArray, sights: int) -> list[int]:

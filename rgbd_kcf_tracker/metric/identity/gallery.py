@@ -252,7 +252,8 @@ class Gallery:
         self.views: list[View] = []
         self.looks: Looks | None = None
         self.top: float | None = None
-        self._tops: list[float] = []
+        self._learned: list[float] = []
+        self._tops: list[tuple[float, float]] = []
         self._largest = 0.0
 
     def log_odds(self, view: View, alike: float | None = None) -> float:
@@ -262,31 +263,71 @@ class Gallery:
             view: the view.
             alike: its likeness to the most alike one of the gallery, where that is known.
         """
-        odds = height_log_odds(view.top, self.top)
-        if self.looks is None:
-            return odds
-        if alike is None:
+        if self.looks is not None and alike is None:
             alike = float(similarity(view, self.looks).max())
-        area = min(view.total, self._largest)
-        return odds + look_log_odds(alike, area, len(self.views))
+        return self._log_odds(view, alike, len(self.views))
 
-    def learn_height(self, top: float) -> None:
-        """Take a height of the head above the floor, in metres."""
-        self._tops = [*self._tops[1 - HEIGHT_MEMORY :], top]
-        self.top = float(median(self._tops))
+    def log_odds_before(self, time: float, view: View, alike: FloatArray) -> float | None:
+        """The same by what was learned before ``time``, in seconds; None where nothing was.
 
-    def learn(self, view: View) -> None:
-        """Take a view that is surely of this person, where it shows something new."""
+        Args:
+            time: seconds.
+            view: the view.
+            alike: its likeness to each of the gallery, ``(n,)``.
+        """
+        old = alike[np.array(self._learned) < time]
+        return self._log_odds(view, float(old.max()), len(old)) if len(old) else None
+
+    def _log_odds(self, view: View, alike: float | None, views: int) -> float:
+        odds = height_log_odds(view.top, self.top)
+        if alike is None:
+            return odds
+        return odds + look_log_odds(alike, min(view.total, self._largest), views)
+
+    def learn_height(self, top: float, time: float) -> None:
+        """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""
+        self._set_tops([*self._tops, (time, top)])
+
+    def learn(self, view: View, time: float) -> None:
+        """Take a view that is surely of this person, where it shows something new.
+
+        Args:
+            view: the view.
+            time: seconds, when it was seen.
+        """
         if self.looks is not None:
             alike = similarity(view, self.looks)
             if alike.max() > NOVEL:
                 return
             if len(self.views) >= MOST_VIEWS:
                 # Of the two most alike the older goes, never the first, which is what was chosen.
-                self.views.pop(self._most_redundant())
-        self.views.append(view)
-        self.looks = Looks.of(self.views)
-        self._largest = max(each.total for each in self.views)
+                redundant = self._most_redundant()
+                del self.views[redundant], self._learned[redundant]
+        self._set_views([*self.views, view], [*self._learned, time])
+
+    def take(self, other: Gallery) -> None:
+        """Take all that another gallery has, which has turned out to be of the same person."""
+        for view, time in zip(other.views, other._learned, strict=True):
+            self.learn(view, time)
+        self._set_tops(sorted(self._tops + other._tops))
+
+    def taken_back(self, since: float) -> Gallery:
+        """Take back what was learned from ``since`` on, in seconds: it was of somebody else."""
+        late = Gallery()
+        for gallery, mine in ((late, True), (self, False)):
+            kept = [n for n, time in enumerate(self._learned) if (time >= since) == mine]
+            gallery._set_views([self.views[n] for n in kept], [self._learned[n] for n in kept])
+            gallery._set_tops([each for each in self._tops if (each[0] >= since) == mine])
+        return late
+
+    def _set_views(self, views: list[View], learned: list[float]) -> None:
+        self.views, self._learned = views, learned
+        self.looks = Looks.of(views) if views else None
+        self._largest = max((each.total for each in views), default=0.0)
+
+    def _set_tops(self, tops: list[tuple[float, float]]) -> None:
+        self._tops = tops[-HEIGHT_MEMORY:]
+        self.top = float(median(top for _, top in self._tops)) if self._tops else None
 
     def _most_redundant(self) -> int:
         assert self.looks is not None

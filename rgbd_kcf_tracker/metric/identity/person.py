@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
@@ -36,13 +37,6 @@ FASTEST, MISPLACED = 3.0, 0.8
 differ."""
 FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
-ENOUGH = 1.5
-"""Sightings, counted by how much showed, from which somebody is taken to be another."""
-LATELY = 1.5
-"""Seconds after which a sighting says a third of what it said: at first often little of somebody
-shows, or somebody else beside him, and a number may have gone over from one to another."""
-AGAIN = 0.25
-"""What twice as many sightings say more, as a share of what one says."""
 TRAVELLED = 0.5
 """Metres that a thing which was moved, or the noise of one, does not travel."""
 ELSEWHERE = 0.02
@@ -82,7 +76,7 @@ class Person:
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
-        self._resembles: dict[int, tuple[float, float, float]] = {}
+        self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
 
     @property
@@ -123,25 +117,15 @@ class Person:
             weight: how much of this one showed, 0 to 1: a part that is seen past somebody else has
                 colours of his as well.
         """
-        total, count, last = self._resembles.get(other, (0.0, 0.0, time))
-        kept = float(np.exp((last - time) / LATELY))
-        self._resembles[other] = kept * total + weight * odds, kept * count + weight, time
+        self._resembles.setdefault(other, Tally()).add(odds, weight, time)
 
     def resemblance(self, other: int) -> float | None:
         """Mean log-odds of looking like another, in the sightings of late; None for none."""
-        total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
-        return total / count if count > 0 else None
+        return self._resembles[other].mean if other in self._resembles else None
 
     def resembles(self, other: int, enough: float = ENOUGH) -> float:
-        """Log-odds of looking like another, by all sightings of late; 0 where there are too few.
-
-        Sightings of one walk say little more than one of them: that two people wear the same does
-        not change from frame to frame.
-        """
-        total, count, _ = self._resembles.get(other, (0.0, 0.0, 0.0))
-        if count == 0 or count < enough:
-            return 0.0
-        return total / count * (1 + AGAIN * float(np.log2(max(count, 1.0))))
+        """Log-odds of looking like another, by all sightings of late; 0 where there are too few."""
+        return self._resembles[other].odds(enough) if other in self._resembles else 0.0
 
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""
@@ -153,8 +137,24 @@ class Person:
         self.mobile |= newcomer.mobile
         self.met |= newcomer.met
         self.travelled = max(self.travelled, newcomer.travelled)
-        for view in newcomer.gallery.views:
-            self.gallery.learn(view)
+        self.gallery.take(newcomer.gallery)
+
+    def exchange(self, other: Person, since: float) -> None:
+        """Go on as each other: the two turned out to have been taken for one another.
+
+        Args:
+            other: the other.
+            since: seconds; what was learned of their looks from then on goes along.
+        """
+        self.place, other.place = other.place, self.place
+        self.velocity, other.velocity = other.velocity, self.velocity
+        self.seen_at, other.seen_at = other.seen_at, self.seen_at
+        self.last, other.last = other.last, self.last
+        self.figure, other.figure = other.figure, self.figure
+        mine, his = self.gallery.taken_back(since), other.gallery.taken_back(since)
+        self.gallery.take(his)
+        other.gallery.take(mine)
+        self._resembles, other._resembles = {}, {}
 
     def carried(self, motion: Pose, ahead: FloatArray) -> None:
         """Keep the place in the world while the camera moves.

@@ -1,0 +1,52 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What several sightings of the same say together."""
+
+from __future__ import annotations
+
+import math
+
+ENOUGH = 1.5
+"""Sightings, counted by how much showed, from which they are believed."""
+LATELY = 1.5
+"""Seconds after which a sighting says a third of what it said: at first often little of somebody
+shows, or somebody else beside him, and a number may have gone over from one to another."""
+AGAIN = 0.25
+"""What twice as many sightings say more, as a share of what one says."""
+
+
+class Tally:
+    """Log-odds that sightings gave, of which those of late and those that show more count more."""
+
+    def __init__(self) -> None:
+        self._total = self._count = self._last = 0.0
+
+    def add(self, odds: float, weight: float, time: float) -> None:
+        """Take a sighting.
+
+        Args:
+            odds: log-odds.
+            weight: how much showed, 0 to 1: a part that is seen past somebody else has colours of
+                his as well.
+            time: seconds; what was seen before counts less.
+        """
+        kept = math.exp((self._last - time) / LATELY)
+        self._total = kept * self._total + weight * odds
+        self._count = kept * self._count + weight
+        self._last = time
+
+    @property
+    def mean(self) -> float | None:
+        """Mean log-odds; None where nothing was seen."""
+        return self._total / self._count if self._count > 0 else None
+
+    def odds(self, enough: float = ENOUGH) -> float:
+        """Log-odds by all of them; 0 where they count less than ``enough``.
+
+        Sightings of one walk say little more than one of them: that two people wear the same does
+        not change from frame to frame.
+        """
+        if self._count == 0 or self._count < enough:
+            return 0.0
+        return self._total / self._count * (1 + AGAIN * math.log2(max(self._count, 1.0)))
