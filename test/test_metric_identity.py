@@ -51,7 +51,8 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
-from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import person_sized
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
@@ -253,6 +254,18 @@ def test_a_thing_that_was_moved_is_nobody_until_it_walks_or_stands_upright():
     thing.moved_to(np.array([0.8, 3.0]), 1.0)
     assert thing.alive
     assert Person(2, np.zeros(2), 0.0, chosen=True).alive
+
+
+@pytest.mark.parametrize('cut_off', ['', 'left', 'top', 'right', 'bottom'])
+def test_what_is_short_has_a_persons_size_where_a_side_of_it_is_cut_off(cut_off: str):
+    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    short = sight.mask[: round(0.6 * len(sight.mask))]  # as who sits
+    sides = Sides(*(side == cut_off for side in ('left', 'top', 'right', 'bottom')))
+    left, top, right, bottom = sight.metres
+    metres = (left, top, right, top + 0.6 * (bottom - top))
+    seen = dataclasses.replace(sight, mask=short, cut=sides, metres=metres)
+    assert 0.8 < seen.height < 1.2
+    assert person_sized(seen) == bool(cut_off)
 
 
 def test_a_person_stays_in_the_world_while_the_camera_turns():
@@ -575,6 +588,26 @@ def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen,
         first = next(each for each in found if each is not None)
         assert {first.first, first.second} == {one.person for one in here}
         assert first.since == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize('lost', [True, False])
+def test_who_comes_where_another_was_lost_is_somebody_new_if_he_looks_otherwise(lost: bool):
+    watched = Watched()
+    one = watched.walk(-1.0, 0.0, 3.0, RED)
+    know_more(one, ALL_SIDES)
+    for _ in range(2 * lost):
+        watched.see()
+    views = list(one.gallery.views)
+    taken_for = [who(watched.see(Someone(0.0, 3.0, (40, 80, 190), (90, 60, 60))), 0)]
+    for _ in range(7):
+        account = watched.see(Someone(0.0, 3.0, (40, 80, 190), (90, 60, 60)))
+        taken_for.append(who(account, 0))
+    assert taken_for[0] is one, 'by his place he may be he'
+    assert (taken_for[-1] is one) == (not lost)  # nobody changes clothes before the camera
+    if lost:
+        assert one.gallery.views == views, 'what was learned is taken back'
+        assert account.time - one.seen_at > 0.6
+        assert taken_for[-1].number != one.number
 
 
 def test_those_who_were_taken_for_one_another_get_their_numbers_back():

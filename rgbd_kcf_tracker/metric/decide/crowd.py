@@ -345,7 +345,10 @@ class Crowd:
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(self._followed(account), alike, time)
         if mixed_up is not None:
-            mixed_up.first.exchange(mixed_up.second, mixed_up.since)
+            other = mixed_up.second
+            if other is None:
+                other = self.welcome(mixed_up.first.place, mixed_up.since)
+            mixed_up.first.exchange(other, mixed_up.since)
             account, _ = self._explained(scene, sights, time)
         for column, row in enumerate(account.owner):
             if row >= 0:

@@ -1,11 +1,12 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Two who came near each other, and may have been taken for one another since.
+"""Numbers that may have gone over to somebody else, and how that shows.
 
-Where they pass, one hides the other or both are one figure, and places say little of who is who.
-Afterwards places say much of it, and each is followed as whoever he was taken for; only their looks
-tell, over some sightings, and by what was known of them before.
+Where two pass each other, one hides the other or both are one figure, and places say little of who
+is who; nor do they where somebody comes into view just where another was lost. Afterwards places
+say much, and each is followed as whoever he was taken for. Only the looks tell, over some sightings
+and by what was known before.
 """
 
 from __future__ import annotations
@@ -30,10 +31,14 @@ BEFORE = 1.0
 """Seconds before they came near from which on what was learned of them may be of the other: the
 figure was of both before it was parted."""
 AFTER = 5.0
-"""Seconds after they were near for which it is watched who is who."""
-MIXED_UP, ENOUGH = 2.0, 2.5
-"""Log-odds from which they were taken for one another, as for a newcomer who is somebody known; and
-sightings, counted by how much showed, that must say so, for each is where he was expected."""
+"""Seconds for which it is watched who is who after they were near, or since one came back."""
+MIXED_UP = 2.0
+"""Log-odds from which two were taken for one another, as for a newcomer who is somebody known."""
+SOMEBODY_NEW = 3.0
+"""Log-odds (20 to 1) from which who came back is none of those who are known: another side or
+another light may show of him."""
+ENOUGH = 2.5
+"""Sightings, counted by how much showed, that must say so: each is where he was expected."""
 
 
 class Followed(NamedTuple):
@@ -55,63 +60,106 @@ class Followed(NamedTuple):
 
 
 class MixUp(NamedTuple):
-    """Two who were taken for one another, and since when that may be, in seconds."""
+    """Two who were taken for one another, and since when that may be, in seconds.
+
+    ``second`` is None where somebody new was taken for ``first``.
+    """
 
     first: Person
-    second: Person
+    second: Person | None
     since: float
 
 
 @dataclass
-class _Meeting:
+class _Doubt:
+    """Sightings of who may be another.
+
+    Attributes:
+        since: seconds, from when on what was learned may be of another.
+        last: seconds, when places last said little.
+        said: log-odds of it by the looks.
+    """
+
     since: float
     last: float
     said: Tally = field(default_factory=Tally)
 
 
 class MixUps:
-    """Watches all who came near each other."""
+    """Watches all who came near each other or were lost for a moment."""
 
     def __init__(self) -> None:
-        self._meetings: dict[tuple[int, int], _Meeting] = {}
+        self._meetings: dict[tuple[int, int], _Doubt] = {}
+        self._returns: dict[int, _Doubt] = {}
+        self._time = 0.0
 
     def watch(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
         """Take the next frame.
 
         Args:
-            here: all in view.
+            here: all in view, before this sight is learned.
             alike: ``(v, n)`` likeness of each of ``n`` sights to each of the ``v`` known views.
             time: seconds.
 
         Returns:
-            Two of them who were taken for one another, the first that are found; they are watched
-            no longer.
+            Whose number went over to another, the first of them that is found.
         """
-        self._meetings = {k: m for k, m in self._meetings.items() if time - m.last < AFTER}
+        self._meetings = {k: d for k, d in self._meetings.items() if time - d.last < AFTER}
+        self._returns = {k: d for k, d in self._returns.items() if time - d.last < AFTER}
+        found = self._returned(here, alike, time) or self._met(here, alike, time)
+        self._time = time
+        return found
+
+    def _returned(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
+        found = None
+        for one in here:
+            number = one.person.number
+            if one.person.chosen:  # he is recognised by who follows him
+                continue
+            if one.person.seen_at < self._time:
+                self._returns[number] = _Doubt(self._time, time)
+            doubt = self._returns.get(number)
+            if doubt is None:
+                continue
+            odds = one.person.gallery.log_odds_before(
+                doubt.since, one.view, alike[one.views, one.column]
+            )
+            if odds is None:
+                continue
+            doubt.said.add(-odds, _shows(one.view), time)
+            if found is None and doubt.said.odds(ENOUGH) > SOMEBODY_NEW:
+                found = MixUp(one.person, None, doubt.since)
+                del self._returns[number]
+        return found
+
+    def _met(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
         if len(here) < 2:
             return None
+        found = None
         places = np.stack([one.place for one in here])
         near = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) < NEAR
-        found = None
         for i, one in enumerate(here):
             for j, other in enumerate(here[:i]):
-                key = (other.person.number, one.person.number)
-                key = (min(key), max(key))
-                meeting = self._meetings.get(key)
+                numbers = sorted((one.person.number, other.person.number))
+                key = numbers[0], numbers[1]
                 if near[i, j]:
-                    if meeting is None:
-                        meeting = self._meetings[key] = _Meeting(time - BEFORE, time)
-                    meeting.last = time
-                if meeting is None:
+                    self._meetings.setdefault(key, _Doubt(time - BEFORE, time)).last = time
+                doubt = self._meetings.get(key)
+                if doubt is None:
                     continue
-                crosswise = _crosswise(one, other, alike, meeting.since)
+                crosswise = _crosswise(one, other, alike, doubt.since)
                 if crosswise is None:
                     continue
-                meeting.said.add(*crosswise, time)
-                if found is None and meeting.said.odds(ENOUGH) > MIXED_UP:
-                    found = MixUp(one.person, other.person, meeting.since)
+                doubt.said.add(*crosswise, time)
+                if found is None and doubt.said.odds(ENOUGH) > MIXED_UP:
+                    found = MixUp(one.person, other.person, doubt.since)
                     del self._meetings[key]
         return found
+
+
+def _shows(view: View) -> float:
+    """How much shows of a sight, 0 to 1."""
+    return min(1.0, view.total / WHOLE_AREA)
 
 
 def _crosswise(
@@ -131,5 +179,5 @@ def _crosswise(
         if odds is not None and as_taken is not None:
             crossed += odds
             straight += as_taken
-            shows.append(min(1.0, seen.view.total / WHOLE_AREA))
+            shows.append(_shows(seen.view))
     return (min(crossed, crossed - straight), sum(shows) / len(shows)) if shows else None

@@ -81,7 +81,7 @@ def person_sized(seen: Silhouette) -> bool:
     That is enough for what has come to stand before a room that is known: somebody too near to the
     camera for his head to show, or who stoops.
     """
-    cut_off = seen.cut.top or seen.cut.bottom
+    cut_off = seen.cut.any
     return (
         LENGTH[cut_off] <= seen.height <= HEIGHT[1]
         and WIDTH[0] <= seen.width <= WIDTH[1]
