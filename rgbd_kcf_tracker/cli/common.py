@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 if TYPE_CHECKING:
+    from rgbd_kcf_tracker.parameters import Parameters
     from rgbd_kcf_tracker.recordings import ReadOptions, Recording
 
 T = TypeVar('T')
@@ -189,6 +190,24 @@ def parse_assignments(items: Sequence[str]) -> dict[str, str]:
             raise ParameterError(f'--param {item!r}: write key=value')
         values[key.strip()] = value.strip()
     return values
+
+
+def tracker_parameters(args: argparse.Namespace, variant: str) -> Parameters:
+    """The parameters of one tracker by ``--param``; a key may name it, as where there are several.
+
+    Raises:
+        ParameterError: for an unknown variant or parameter, a bad value, or one of another tracker.
+    """
+    from rgbd_kcf_tracker.parameters import with_overrides
+    from rgbd_kcf_tracker.variants import default_parameters
+
+    given: dict[str, str] = {}
+    for key, value in parse_assignments(args.param).items():
+        owner, dot, name = key.rpartition('.')
+        if dot and owner != variant:
+            raise ParameterError(f'--param {key}: the tracker is {variant}, not {owner}')
+        given[name] = value
+    return with_overrides(default_parameters(variant), given)
 
 
 def add_overwrite_option(parser: argparse._ActionsContainer, what: str) -> None:

@@ -21,10 +21,10 @@ from rgbd_kcf_tracker.cli.common import (
     add_overwrite_option,
     add_reading_options,
     add_tracker_options,
-    parse_assignments,
     parse_box,
     progress,
     read_options,
+    tracker_parameters,
 )
 from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError
 
@@ -325,11 +325,10 @@ def make_follower(args: argparse.Namespace) -> _One | _Several:
         ParameterError: for an unknown variant or parameter, or options that do not go together.
     """
     import rgbd_kcf_tracker
-    from rgbd_kcf_tracker.parameters import with_overrides
-    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker
 
     variant = args.variant or DEFAULT_VARIANT
-    parameters = with_overrides(default_parameters(variant), parse_assignments(args.param))
+    parameters = tracker_parameters(args, variant)
     if not _several(args):
         return _One(create_tracker(variant, parameters), variant)
     if args.bag:

@@ -22,8 +22,8 @@ from rgbd_kcf_tracker.cli.common import (
     add_tracker_options,
     counter,
     open_source,
-    parse_assignments,
     parse_box,
+    tracker_parameters,
 )
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.extras import require
@@ -79,13 +79,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until it is interrupted, or write the file."""
-    from rgbd_kcf_tracker.parameters import with_overrides
-    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
 
     require('view', 'the page')
     _check_export(args)
     variant = args.variant or DEFAULT_VARIANT
-    parameters = with_overrides(default_parameters(variant), parse_assignments(args.param))
+    parameters = tracker_parameters(args, variant)
     with open_source(args) as recording:
         warnings = Warnings(recording.warnings)
         warnings.show()
