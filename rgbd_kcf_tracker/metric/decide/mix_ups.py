@@ -39,6 +39,8 @@ SOMEBODY_NEW = 3.0
 another light may show of him."""
 ENOUGH = 2.5
 """Sightings, counted by how much showed, that must say so: each is where he was expected."""
+SIGHTING = 0.1
+"""Seconds after the last from which a sighting counts in full: sooner it shows nearly the same."""
 
 
 class Followed(NamedTuple):
@@ -91,7 +93,7 @@ class MixUps:
     def __init__(self) -> None:
         self._meetings: dict[tuple[int, int], _Doubt] = {}
         self._returns: dict[int, _Doubt] = {}
-        self._time = 0.0
+        self._time, self._counts = 0.0, 1.0
 
     def watch(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
         """Take the next frame.
@@ -106,6 +108,7 @@ class MixUps:
         """
         self._meetings = {k: d for k, d in self._meetings.items() if time - d.last < AFTER}
         self._returns = {k: d for k, d in self._returns.items() if time - d.last < AFTER}
+        self._counts = min(1.0, (time - self._time) / SIGHTING)
         found = self._returned(here, alike, time) or self._met(here, alike, time)
         self._time = time
         return found
@@ -126,7 +129,7 @@ class MixUps:
             )
             if odds is None:
                 continue
-            doubt.said.add(-odds, _shows(one.view), time)
+            doubt.said.add(-odds, self._counts * _shows(one.view), time)
             if found is None and doubt.said.odds(ENOUGH) > SOMEBODY_NEW:
                 found = MixUp(one.person, None, doubt.since)
                 del self._returns[number]
@@ -150,7 +153,8 @@ class MixUps:
                 crosswise = _crosswise(one, other, alike, doubt.since)
                 if crosswise is None:
                     continue
-                doubt.said.add(*crosswise, time)
+                odds, shows = crosswise
+                doubt.said.add(odds, self._counts * shows, time)
                 if found is None and doubt.said.odds(ENOUGH) > MIXED_UP:
                     found = MixUp(one.person, other.person, doubt.since)
                     del self._meetings[key]
