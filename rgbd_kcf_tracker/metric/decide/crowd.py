@@ -427,7 +427,6 @@ class Crowd:
             for column, sight in enumerate(sights):
                 most = None if likeness is None else likeness[column]
                 looks[row, column] = person.gallery.log_odds(sight.view, most)
-        for row, person in enumerate(self.people):
             odds[row] = person.place_log_odds(places, time)
             if not person.chosen:
                 odds[row] -= RETURN * (1 - float(np.exp((person.seen_at - time) / GONE)))

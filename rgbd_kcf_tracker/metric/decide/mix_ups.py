@@ -37,7 +37,7 @@ MIXED_UP = 2.0
 SOMEBODY_NEW = 3.0
 """Log-odds (20 to 1) from which who came back is none of those who are known: another side or
 another light may show of him."""
-ENOUGH = 2.5
+SIGHTINGS = 2.5
 """Sightings, counted by how much showed, that must say so: each is where he was expected."""
 SIGHTING = 0.1
 """Seconds after the last from which a sighting counts in full: sooner it shows nearly the same."""
@@ -130,7 +130,7 @@ class MixUps:
             if odds is None:
                 continue
             doubt.said.add(-odds, self._counts * _shows(one.view), time)
-            if found is None and doubt.said.odds(ENOUGH) > SOMEBODY_NEW:
+            if found is None and doubt.said.odds(SIGHTINGS) > SOMEBODY_NEW:
                 found = MixUp(one.person, None, doubt.since)
                 del self._returns[number]
         return found
@@ -155,7 +155,7 @@ class MixUps:
                     continue
                 odds, shows = crosswise
                 doubt.said.add(odds, self._counts * shows, time)
-                if found is None and doubt.said.odds(ENOUGH) > MIXED_UP:
+                if found is None and doubt.said.odds(SIGHTINGS) > MIXED_UP:
                     found = MixUp(one.person, other.person, doubt.since)
                     del self._meetings[key]
         return found
