@@ -8,10 +8,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -155,34 +152,12 @@ def test_init_outside_the_image_keeps_the_target(rig: Rig) -> None:
         assert 'outside the 320x240 image' in values['last_error']
 
 
-@contextmanager
-def longest_stop() -> Iterator[Callable[[], float]]:
-    """For how many seconds the machine let nothing of this process run, at the longest."""
-    longest, done = 0.0, threading.Event()
-
-    def watch() -> None:
-        nonlocal longest
-        last = time.monotonic()
-        while not done.wait(0.005):
-            now = time.monotonic()
-            longest, last = max(longest, now - last), now
-
-    thread = threading.Thread(target=watch)
-    thread.start()
-    try:
-        yield lambda: longest
-    finally:
-        done.set()
-        thread.join()
-
-
 def test_every_pair_at_30_hz(rig: Rig) -> None:
     """Free running, as a camera does it: order is kept, and nothing is lost or passed over."""
     count = 60
     # Best effort may lose an image on its way, which says nothing of the node.
     quality = {'reliability': 'reliable', 'qos_depth': count}
-    box = box_text(scene(0)[2])
-    with running_node(rig, init_box=box, **quality) as node, longest_stop() as stop:
+    with running_node(rig, init_box=box_text(scene(0)[2]), **quality) as node:
         begun = time.monotonic()
         for index in range(count):
             rig.send(index)
@@ -195,8 +170,7 @@ def test_every_pair_at_30_hz(rig: Rig) -> None:
         rig.wait(lambda: done() == count, what='all pairs')
         counts = node.statistics.snapshot().counts
         rig.wait(lambda: len(rig.boxes) == counts['processed'], what='all boxes')
-        # Three pairs wait beside the newest; where the machine stood still for longer, more arrive.
-        slow = node.statistics.snapshot().times_ms['work'][-1] > 30 or stop() > 3 / 30
+        slow = node.statistics.snapshot().times_ms['work'][-1] > 30
     stamps = [stamp_to_ns(m.header.stamp) for m in rig.boxes]
     assert stamps == sorted(set(stamps))
     assert set(stamps) <= {stamp_of(i) for i in range(count)}
