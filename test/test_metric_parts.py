@@ -16,6 +16,7 @@ from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
+from rgbd_kcf_tracker.metric.decide.parts import Others, Parts
 from rgbd_kcf_tracker.metric.identity.body import Body
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -31,7 +32,7 @@ from rgbd_kcf_tracker.metric.perceive.color_bands import (
     band_histograms,
     band_similarity,
 )
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -55,6 +56,46 @@ def blobs(seed: int, size: int = 200) -> np.ndarray:
 
 
 # -- depth and surfaces ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('size', 'step'), [((540, 960), 4), ((1080, 1920), 8), ((424, 512), 2), ((480, 640), 3)]
+)
+def test_the_view_of_an_image_is_every_step_th_pixel_as_that_of_its_depth(
+    size: tuple[int, int], step: int
+):
+    image = np.random.default_rng(0).integers(0, 256, (*size, 3), dtype=np.uint8)
+    depth = image[..., 0].astype(np.float32) + 1
+    view = DepthView.of(Frame(image, depth, 0), size[1] // step)
+    assert view is not None
+    assert view.step == step
+    small = view_image(image, step, view.shape)
+    assert np.array_equal(small, image[step // 2 :: step, step // 2 :: step])
+    assert np.array_equal(small[..., 0] + 1.0, view.depth)
+
+
+def test_the_share_of_a_surface_that_is_others_is_that_of_its_pixels():
+    rng = np.random.default_rng(3)
+    depth = np.repeat(rng.integers(1, 5, (8, 6)), 20, axis=0).repeat(40, axis=1).astype(np.float32)
+    scene = SceneReader(240, 0.04, 0.03, 0.0, 0).read(
+        Frame(np.zeros((160, 240, 3), np.uint8), depth, 0, CAMERA), 0.0
+    )
+    assert scene is not None
+    masks = [(slice(10, 50), slice(20, 70)), (slice(60, 100), slice(100, 180))]
+    figures = [
+        Silhouette.of(
+            scene.view, part[1].start, part[0].start, np.ones((40, width), bool), 0, Rim()
+        )
+        for part, width in zip(masks, (50, 80), strict=True)
+    ]
+    others = Others(Parts(scene, figures), [False, False, True, False])
+    theirs = np.zeros((160, 240), bool)
+    theirs[masks[0]] = True
+    labels = scene.surfaces.labels
+    assert len(scene.surfaces) > 5
+    for label in range(1, len(scene.surfaces)):
+        share = theirs[labels == label].mean()
+        assert others.share_of_surface(label) == pytest.approx(share)
 
 
 def test_view_takes_every_step_and_fills_single_holes():
@@ -97,6 +138,14 @@ def test_floor_is_found_and_what_stands_on_it_is_above():
 
 def test_a_wall_is_no_floor():
     assert FloorFinder(0).update(view_of(wall(2.0))) is None
+
+
+def test_a_known_floor_is_fitted_again_only_where_it_is_to_be_learned():
+    finder, view = FloorFinder(0), view_of(floor_scene())
+    first = finder.update(view)
+    assert first is not None
+    assert finder.update(view, learns=False) is first
+    assert finder.update(view) is not first
 
 
 def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():

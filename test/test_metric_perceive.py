@@ -338,6 +338,60 @@ def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
     assert sum(float(motion.translation[2]) for motion in moved) == pytest.approx(-0.006)
 
 
+# -- how often what lasts is learned --------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('rate', 'wanted'),
+    [
+        (30, [0.1, None, None, 0.1, None, None, 0.1]),
+        (15, [0.09, None, 2 / 15, None, 2 / 15]),
+        (10, [0.1, 0.1, 0.1]),
+        (5, [0.2, 0.2]),
+    ],
+)
+def test_what_lasts_is_learned_ten_times_a_second_at_the_most(
+    rate: int, wanted: list[float | None]
+):
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    since = []
+    for i in range(len(wanted)):
+        scene = reader.read(picture([], i / rate), 1 / rate if i else 0.0)
+        assert scene is not None
+        since.append(scene.since)
+    assert [s is None for s in since] == [w is None for w in wanted]
+    assert [s for s in since[1:] if s is not None] == pytest.approx(
+        [w for w in wanted[1:] if w is not None]
+    )
+
+
+def test_a_camera_that_moves_learns_from_every_frame():
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    since = []
+    for i in range(6):
+        pose = Pose(np.eye(3), np.array([0.0, 0.0, 0.05 * i]))
+        scene = reader.read(picture([], i / 30, pose=pose), 1 / 30 if i else 0.0)
+        assert scene is not None
+        since.append(scene.since)
+    assert None not in since[2:], 'that it moves is known from the second frame on'
+
+
+def test_a_room_that_is_only_compared_is_as_it_was():
+    room = known_room(wall())
+    depth = with_thing()
+    see(room, depth, 0.1, None)
+    depth[:20] = WALL + 0.05
+    for _ in range(40):
+        room.update(depth, 0.1, None, surfaces_in(depth, depth > 0, 0.04, 0.03), learns=False)
+        assert room.before[THING].all()
+        assert room.before.sum() == 60 * 30
+    assert (room.depth == WALL).all()
+    # The time counts: the thing has stood there all the while.
+    see(room, depth, 0.1, None)
+    assert not room.before.any()
+    assert room.depth[:20].max() > WALL
+
+
 # -- people who have not moved yet ----------------------------------------------------------------
 
 

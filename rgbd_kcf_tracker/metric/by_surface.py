@@ -331,7 +331,7 @@ class BySurface:
         )
         self._middle.forget()
 
-    def take(self, scene: Scene, found: Candidate, dt: float) -> Box:
+    def take(self, scene: Scene, found: Candidate) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
 
         Returns:
@@ -342,11 +342,12 @@ class BySurface:
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
         self._middle.seen(scene.view, seen, placed, self.body)
-        if not seen.cut.any and placed.fraction > LEARN_FRACTION:
+        since = scene.since
+        if since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
-            self.body.learn_colors(seen, scene.codes, scene.view, top, dt)
-            self._learn_around(scene, seen, dt)
-            self.body.learn_size(seen, dt)
+            self.body.learn_colors(seen, scene.codes, scene.view, top, since)
+            self._learn_around(scene, seen, since)
+            self.body.learn_size(seen, since)
         return self.box(scene, found)
 
     def miss(self, scene: Scene | None, dt: float) -> None:

@@ -212,7 +212,7 @@ class Follower:
             self._start_over(account, whole)
             box = outline_box(account.scene, whole)
             return self._tracked(frame, box, found.probability, whole.depth, self._belief())
-        box = surface.take(account.scene, found, dt)
+        box = surface.take(account.scene, found)
         self.seen = found.seen
         outline = BySurface.outline(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 N = TypeVar('N', bound='Node')
 
 USER_MISTAKE, FAILURE = 2, 1
-_SPIN_PERIOD_S = 0.1
+_SPIN_PERIOD_S = 0.25
 
 
 def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:

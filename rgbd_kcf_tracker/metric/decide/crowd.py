@@ -538,7 +538,7 @@ class Crowd:
         if account.time > person.seen_at:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0
-        if not sure:
+        if not sure or (scene.since is None and person.gallery.views):
             return
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import compress
 
 import numpy as np
@@ -56,14 +55,6 @@ class Parts:
         counts: list[int] = np.bincount(kinds, minlength=self.length).tolist()
         return counts
 
-    @cached_property
-    def of_surfaces(self) -> npt.NDArray[np.float64]:
-        """How many of each surface's pixels are of each kind, ``(n, kinds)`` whole numbers."""
-        count = len(self.surfaces)
-        both = self.surfaces.labels * self.length + self.kinds
-        counts = np.bincount(both.ravel(), minlength=count * self.length)
-        return counts.reshape(count, -1).astype(np.float64)
-
 
 @dataclass(frozen=True, eq=False)
 class Others:
@@ -86,9 +77,10 @@ class Others:
         counts = self.parts.counts(seen)
         return sum(compress(counts, self.theirs)) / sum(counts)
 
-    @cached_property
-    def of_surfaces(self) -> npt.NDArray[np.float64]:
-        """Share of each surface's pixels, ``(n,)`` 0 to 1."""
-        theirs = self.parts.of_surfaces @ np.array(self.theirs, np.float64)
-        shares: npt.NDArray[np.float64] = theirs / np.maximum(self.parts.surfaces.pixels, 1)
-        return shares
+    def share_of_surface(self, label: int) -> float:
+        """Share of one surface's pixels, 0 to 1."""
+        surfaces = self.parts.surfaces
+        left, top, width, height = surfaces.boxes[label].tolist()
+        part = slice(top, top + height), slice(left, left + width)
+        kinds = self.parts.kinds[part][surfaces.labels[part] == label]
+        return sum(compress(self.parts.counted(kinds), self.theirs)) / max(len(kinds), 1)

@@ -90,7 +90,10 @@ def _split(
     if z < 0.2:
         return []
     large = sizes.area > TOO_LARGE * body.area
-    large |= (others.of_surfaces > MIXED) & (sizes.area > body.area)
+    mixed = (sizes.area > body.area) & ~large
+    mixed[0] = False
+    for label in np.flatnonzero(mixed).tolist():
+        large[label] = others.share_of_surface(label) > MIXED
     large[0] = False
     if not large.any():
         return []
@@ -190,7 +193,8 @@ def gathered(
     inside &= surfaces.pixels >= 3
     inside[0] = False
     inside[seen.label] = False
-    inside &= others.of_surfaces < 0.5
+    for label in np.flatnonzero(inside).tolist():
+        inside[label] = others.share_of_surface(label) < 0.5
     more = boxes[inside]
     if not len(more):
         return None

@@ -27,7 +27,6 @@ STEEPNESS = 3.0
 _STEPS = 32
 """Steps of the logarithm for each factor of e: finer than the levels by far."""
 
-_PIXEL = np.dtype('V3')
 _LOG = np.rint(_STEPS * np.log((np.arange(256) + DARKEST) / DARKEST)).astype(np.uint8)
 _TOP = int(_LOG[-1])
 # Tables of 256, of which those of a tint begin at the largest negative difference.
@@ -46,14 +45,14 @@ def _blur(levels: int) -> npt.NDArray[np.float32]:
 
 
 _BLUR_LEVEL, _BLUR_TINTS = _blur(LIGHTNESS), np.kron(_blur(TINTS), _blur(TINTS))
-_LUMA = np.array([[0.11, 0.59, 0.30]], np.float32)
-"""Shares of blue, green and red in lightness (ITU-R BT.601, rounded)."""
+_LUMA = np.array([0.114, 0.587, 0.299])
+"""Shares of blue, green and red in lightness, which are OpenCV's (ITU-R BT.601)."""
 
 
 def view_image(
     color: npt.NDArray[np.uint8], step: int, shape: tuple[int, int]
 ) -> npt.NDArray[np.uint8]:
-    """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image.
+    """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image, each from the middle of a step.
 
     Args:
         color: the image.
@@ -63,10 +62,13 @@ def view_image(
     Returns:
         ``shape + (3,)`` uint8.
     """
-    half, (rows, cols) = step // 2, shape
-    # Pixels as items of three bytes are copied twice as fast as byte by byte.
-    pixels = np.ascontiguousarray(color).view(_PIXEL)[half::step, half::step, 0][:rows, :cols]
-    return np.ascontiguousarray(pixels).view(np.uint8).reshape(rows, cols, 3)
+    rows, cols = shape
+    # Of a last step that the image cuts off, OpenCV spreads what is missing over the others.
+    whole = color[: rows * step, : cols * step]
+    image: npt.NDArray[np.uint8] = cv2.resize(
+        whole, (cols, rows), interpolation=cv2.INTER_NEAREST_EXACT
+    )
+    return image
 
 
 def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
@@ -76,7 +78,7 @@ def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
     """
     logs = cv2.LUT(image, _LOG)
     blue, green, red = cv2.split(logs)
-    codes: npt.NDArray[np.int32] = cv2.LUT(cv2.transform(logs, _LUMA), _LEVEL)
+    codes: npt.NDArray[np.int32] = cv2.LUT(cv2.cvtColor(logs, cv2.COLOR_BGR2GRAY), _LEVEL)
     offset = _TOP - green  # may wrap, as its sums with the others then do: they lie in 0 to 2 _TOP
     codes += cv2.LUT(red + offset, _TINT_OF_RED)
     codes += cv2.LUT(blue + offset, _TINT)
@@ -104,8 +106,7 @@ def palette() -> npt.NDArray[np.float32]:
     level = (np.arange(LIGHTNESS) + 0.5) * (_TOP / LIGHTNESS / _STEPS)
     tint = np.arctanh(2 * (np.arange(TINTS) + 0.5) / TINTS - 1) / STEEPNESS
     y, red, blue = np.meshgrid(level, tint, tint, indexing='ij')
-    shares = _LUMA[0].astype(np.float64)
-    green = y - shares[0] * blue - shares[2] * red
+    green = y - _LUMA[0] * blue - _LUMA[2] * red
     logs = np.stack((green + blue, green, green + red), axis=-1).reshape(CODES, 3)
     colors: npt.NDArray[np.float32] = np.clip(DARKEST * np.expm1(logs), 0, 255).astype(np.float32)
     return colors

@@ -101,8 +101,15 @@ class FloorFinder:
         self._floor: Floor | None = None
         self._wait = 0
 
-    def update(self, view: DepthView) -> Floor | None:
-        """The floor of this view, or None where no plane passes for one."""
+    def update(self, view: DepthView, learns: bool = True) -> Floor | None:
+        """The floor of this view, or None where no plane passes for one.
+
+        Args:
+            view: the depth.
+            learns: whether a floor that is known is fitted again.
+        """
+        if self._floor is not None and not learns:
+            return self._floor
         h, w = view.shape
         flat = view.depth.reshape(-1)
         start = (h // 3) * w

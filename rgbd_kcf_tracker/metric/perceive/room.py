@@ -84,14 +84,6 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
     return seen
 
 
-def _mostly(mask: Mask, surfaces: Surfaces) -> Mask:
-    """The pixels of those surfaces of which most lies in a mask, ``(h, w)`` bool."""
-    inside = np.bincount(surfaces.labels[mask], minlength=len(surfaces)) > MOST * surfaces.pixels
-    inside[0] = False
-    result: Mask = inside[surfaces.labels]
-    return result
-
-
 class Room:
     """The room as one view sees it.
 
@@ -110,6 +102,7 @@ class Room:
         self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
+        self._unlearned = 0.0
 
     def restart(self, depth: DepthArray, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -158,7 +151,12 @@ class Room:
         return lost
 
     def update(
-        self, depth: DepthArray, dt: float, somebody: Mask | None, surfaces: Surfaces
+        self,
+        depth: DepthArray,
+        dt: float,
+        somebody: Mask | None,
+        surfaces: Surfaces,
+        learns: bool = True,
     ) -> None:
         """Compare the next view with the room and learn from it.
 
@@ -168,6 +166,7 @@ class Room:
             somebody: ``(h, w)`` bool, pixels that belonged to somebody in the last view, who may
                 stand still for as long as he likes; None for nobody.
             surfaces: of the view.
+            learns: whether the room is learned from it, or only compared.
         """
         valid = depth > 0
         known = self.depth > 0
@@ -175,24 +174,16 @@ class Room:
         nearer = self.depth - depth
         both = valid & known
         before = both & (nearer > allowed)
-        open_ = valid & ~known & (self._blind >= BLIND_FRAMES)
-        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + allowed
-        left = open_ & (self._front > 0) & (depth > self._front + leap)
-        open_ &= ~left
-        before |= open_
         farther = both & (nearer < -allowed)
-        again = farther & (np.abs(depth - self._farther) <= allowed)
         same = both & ~(before | farther)
-        if open_.any():
-            # What is farther than who stood there, and goes on as the room, is the room.
-            behind = open_ & (depth > self._front + np.float32(LEAP))
-            if behind.any():
-                behind &= _mostly(same, surfaces)
-                before &= ~behind
-                open_ &= ~behind
-                left |= behind
-            # Who passes before somebody does not take his place.
-            np.copyto(self._front, depth, where=open_ & (depth > self._front - leap))
+        open_ = np.flatnonzero(valid & ~known & (self._blind >= BLIND_FRAMES))
+        if len(open_):
+            np.put(before, open_, self._taken(open_, depth, dt, allowed, same, surfaces))
+        self.before, self.still = before, same
+        self._unlearned += dt
+        if not learns:
+            return
+        again = farther & (np.abs(depth - self._farther) <= allowed)
         nearer *= same
         nearer *= np.float32(BLEND)
         self.depth -= nearer
@@ -200,7 +191,6 @@ class Room:
         fresh |= again
         np.copyto(self.depth, depth, where=fresh)
         self._farther = depth * farther
-        self._blind[left] = 0
         self._blind *= ~both
         np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
         # A view of which most is missing says nothing of the place.
@@ -209,8 +199,44 @@ class Room:
             # What was known of a pixel that has no reading any more was somebody, who has gone.
             gone = self._blind >= GONE_FRAMES
             self.depth[gone] = self._front[gone] = 0
-        self.before, self.still = before, same
-        self._settle(depth, dt, allowed, somebody)
+        self._settle(depth, self._unlearned, allowed, somebody)
+        self._unlearned = 0.0
+
+    def _taken(
+        self,
+        open_: npt.NDArray[np.intp],
+        depth: DepthArray,
+        dt: float,
+        allowed: DepthArray,
+        same: Mask,
+        surfaces: Surfaces,
+    ) -> Mask:
+        """Which of the places where the room is not known show somebody, ``(n,)`` bool.
+
+        Args:
+            open_: their indices, ``(n,)``.
+            depth: of the view.
+            dt: seconds since the last.
+            allowed: of the depth, see :func:`tolerance`.
+            same: ``(h, w)`` bool, the pixels that show the room.
+            surfaces: of the view.
+        """
+        now, front = np.take(depth, open_), np.take(self._front, open_)
+        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + np.take(allowed, open_)
+        left = (front > 0) & (now > front + leap)
+        # What is farther than who stood there, and goes on as the room, is the room.
+        behind = ~left & (now > front + np.float32(LEAP))
+        if behind.any():
+            inside = np.bincount(surfaces.labels[same], minlength=len(surfaces))
+            mostly = inside > MOST * surfaces.pixels
+            mostly[0] = False
+            left |= behind & mostly[np.take(surfaces.labels, open_)]
+        np.put(self._blind, open_[left], 0)
+        # Who passes before somebody does not take his place.
+        taken: Mask = ~left
+        stays = taken & (now > front - leap)
+        np.put(self._front, open_[stays], now[stays])
+        return taken
 
     def _settle(
         self, depth: DepthArray, dt: float, allowed: DepthArray, somebody: Mask | None
