@@ -348,6 +348,24 @@ def test_a_fast_worker_that_was_held_up_catches_up(work_s: float, kept: int) -> 
     assert done[-kept - 1 :] == [100, *range(107 - kept, 107)]
 
 
+def test_nothing_is_dropped_while_the_first_item_takes_longest() -> None:
+    done: list[int] = []
+
+    def work(item: int) -> None:
+        time.sleep(0.15 if item == 0 else 0.001)
+        done.append(item)
+
+    worker = Worker(work, pytest.fail, catch_up=3)
+    dropped = 0
+    for item in range(8):
+        dropped += worker.submit(item)
+        time.sleep(0.04)
+    time.sleep(0.1)
+    assert worker.stop()
+    assert dropped == 0
+    assert done == list(range(8))
+
+
 def test_worker_ends_while_at_work() -> None:
     worker = Worker(lambda _: time.sleep(0.05), pytest.fail, keep=100)
     for item in range(100):

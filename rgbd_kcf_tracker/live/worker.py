@@ -50,8 +50,9 @@ class Worker(Generic[T]):
         work: does one item. It must not raise; what it raises goes to ``failed``.
         failed: told of an exception of ``work`` or of a call, in the worker's thread.
         keep: items kept waiting at most; 1 is "the newest".
-        catch_up: as many more wait while items are worked off faster than they come, so that none
-            is lost where the work, or the whole process, was held up once.
+        catch_up: as many more wait until items are known to be worked off slower than they come, so
+            that none is lost where the work, or the whole process, was held up once: by the first
+            item, which mostly takes longest, as by any other.
         name: of the thread.
     """
 
@@ -105,9 +106,8 @@ class Worker(Generic[T]):
             self._period_s.add(now - self._came_s)
         self._came_s = now
         work, period = self._work_s.value, self._period_s.value
-        if work is None or period is None or work > FAST * period:
-            return self._keep
-        return self._keep + self._catch_up
+        slow = work is not None and period is not None and work > FAST * period
+        return self._keep if slow else self._keep + self._catch_up
 
     def call(self, kind: str, function: Callable[[], None]) -> None:
         """Have a function called in the worker's thread, before the next item.
