@@ -728,6 +728,27 @@ def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colou
         assert track.box.iou(one.box) > 0.9
 
 
+@pytest.mark.parametrize(('pace', 'own'), [(1.2, True), (1.2, False), (5.0, True)])
+def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
+    pace: float, own: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """He was chosen where depth sees nothing, and his look was lost; nobody runs at 5 m/s."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    for i in range(8):
+        paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
+        one = Someone(-0.5 + 0.1 * pace * i, 3.0, **paint)
+        color, depth = images([one])
+        if i < 4:
+            depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert i == 0 or i > 3 or track.box is None
+    assert (track.box is not None) == (own and pace < 2)
+    if track.box is not None:
+        assert track.box.iou(one.box) > 0.9
+
+
 @pytest.mark.parametrize('twin', [False, True])
 def test_a_target_is_at_one_place_only(twin: bool):
     """Of two alike who come in, each alone would be the target; of both neither surely is."""

@@ -55,8 +55,12 @@ NEWCOMER_AREA = 0.1
 """Square metres of him, at the least."""
 COVERED = 0.6
 """Share of a newcomer's outline that lies in the target's box, at the least."""
-EVEN = 0.5
-"""Mean probability of his pixels' colours to be the target's, at the least."""
+WALK, WALKED = 1.4, 0.5
+"""Metres a second by which that box reaches farther to both sides once the look is lost, and for
+how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
+LIKELY = 0.6
+"""Mean probability of his pixels' colours to be the target's, at the least: 0.5 is that of colours
+which were never seen."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least."""
@@ -383,6 +387,7 @@ class Follower:
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = BySurface.outline(scene, seen)
+            reach = self._reach(scene, seen.depth)
             ends = _ends(outline, scene)
             shown, least = _to_side(outline, ends, scene), outline.area
             if self._ends is not None and (
@@ -391,15 +396,21 @@ class Follower:
                 least = min(shown.area, self._last_box.area)
             if (
                 seen.area < NEWCOMER_AREA
-                or shown.intersection(self._last_box) < COVERED * least
+                or shown.intersection(reach) < COVERED * least
                 or shown.iou(self._last_box) < likest
             ):
                 continue
             # Somebody else may come in before the target: he has other colours.
             colors = scene.image[seen.rows, seen.cols]
-            if self._look is None or self._look.likely(colors, seen.mask) >= EVEN:
+            if self._look is None or self._look.likely(colors, seen.mask) >= LIKELY:
                 best, likest = outline, shown.iou(self._last_box)
         return best
+
+    def _reach(self, scene: Scene, depth: float) -> Box:
+        """Where a target at that depth may have walked to from where its look was lost."""
+        b, pixels = self._last_box, scene.view.intrinsics.fx * scene.view.step / depth
+        step = WALK * min(self._unseen, WALKED) * pixels
+        return Box(b.x - step, b.y, b.width + 2 * step, b.height)
 
     # -- answers ----------------------------------------------------------------------------------
 

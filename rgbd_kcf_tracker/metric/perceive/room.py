@@ -180,6 +180,14 @@ class Room:
         if len(open_):
             np.put(before, open_, self._taken(open_, depth, dt, allowed, same, surfaces))
         self.before, self.still = before, same
+        self._blind *= ~both
+        np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
+        # A view of which most is missing says nothing of the place.
+        if valid.any() and np.count_nonzero(both) >= AGREEING * np.count_nonzero(known):
+            cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
+            # What was known of a pixel that has no reading any more was somebody, who has gone.
+            gone = self._blind >= GONE_FRAMES
+            self.depth[gone] = self._front[gone] = 0
         self._unlearned += dt
         if not learns:
             return
@@ -191,14 +199,6 @@ class Room:
         fresh |= again
         np.copyto(self.depth, depth, where=fresh)
         self._farther = depth * farther
-        self._blind *= ~both
-        np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
-        # A view of which most is missing says nothing of the place.
-        if valid.any() and np.count_nonzero(both) >= AGREEING * np.count_nonzero(known):
-            cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
-            # What was known of a pixel that has no reading any more was somebody, who has gone.
-            gone = self._blind >= GONE_FRAMES
-            self.depth[gone] = self._front[gone] = 0
         self._settle(depth, self._unlearned, allowed, somebody)
         self._unlearned = 0.0
 
