@@ -387,13 +387,14 @@ class Follower:
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = BySurface.outline(scene, seen)
-            reach = self._reach(scene, seen.depth)
             ends = _ends(outline, scene)
             shown, least = _to_side(outline, ends, scene), outline.area
             if self._ends is not None and (
                 (ends.left and self._ends.left) or (ends.right and self._ends.right)
             ):
                 least = min(shown.area, self._last_box.area)
+            # Who has taken a step shows whole: a first piece of him is little to know him by.
+            reach = self._last_box if seen.area < WHOLE else self._reach(scene, seen.depth)
             if (
                 seen.area < NEWCOMER_AREA
                 or shown.intersection(reach) < COVERED * least
