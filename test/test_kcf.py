@@ -91,6 +91,10 @@ def test_the_published_geometry() -> None:
     assert large.cell == (8, 8)
     assert WindowGeometry.of(100, 100, KcfParameters()).cell == (8, 8)
     assert WindowGeometry.of(99, 100, KcfParameters()).cell == (4, 4)
+    # Beyond twice that the reference goes on at half resolution, and its cost grows.
+    assert WindowGeometry.of(200, 200, KcfParameters(max_halvings=1)).cell == (8, 8)
+    assert WindowGeometry.of(200, 200, KcfParameters()).cell == (16, 16)
+    assert WindowGeometry.of(400, 800, KcfParameters()).cell == (16, 16)
     huge = WindowGeometry.of(400, 800, KcfParameters(max_halvings=3))
     assert huge.cell == (32, 32)
 

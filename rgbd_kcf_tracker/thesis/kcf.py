@@ -95,9 +95,9 @@ class KcfParameters(Parameters):
         source=_REFERENCE,
     )
     max_halvings: int = parameter(
-        1,
-        'How often a large target may be halved; the reference halves once, more keeps the cost of '
-        'very large targets flat.',
+        2,
+        'How often a large target may be halved. The reference halves once; what is larger than '
+        'twice halve_above, as people near a camera of 1920x1080, then costs more with its size.',
         minimum=0,
         maximum=6,
         source=_REFERENCE,
