@@ -12,7 +12,7 @@ from people_rig import BLUE, CAMERA, COLS, ROWS, WALL, Someone, images, picture,
 
 from rgbd_kcf_tracker import Box, Frame
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, upper_median
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room
@@ -219,6 +219,17 @@ def test_the_light_is_told_from_what_stands_still_alone():
     assert light.gain == pytest.approx(np.ones(3), abs=0.02)
 
 
+@pytest.mark.parametrize(('gain', 'told'), [(0.8, True), (0.99, False)])
+def test_a_sudden_change_of_light_is_told_between_two_measures(gain: float, told: bool):
+    light, image = Light(), texture(3)
+    light.steadied(image, ~NOBODY)
+    changed = np.clip(image * gain, 0, 255).astype(np.uint8)
+    light.steadied(changed, ~NOBODY, learns=False)
+    assert (light.gain == 1).all() != told
+    light.steadied(changed, ~NOBODY)
+    assert light.gain == pytest.approx(np.full(3, 1 / gain), abs=0.02)
+
+
 def test_the_light_is_kept_when_the_camera_looks_elsewhere():
     light = Light()
     light.steadied(texture(1), ~NOBODY)
@@ -279,6 +290,13 @@ def test_the_cameras_motion_is_recovered(motion: Pose):
     angle = np.degrees(np.linalg.norm(cv2.Rodrigues(between.rotation)[0]))
     assert angle < 0.3
     assert np.linalg.norm(found.of(np.array([0, 0, 3.0])) - motion.of(np.array([0, 0, 3.0]))) < 0.03
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_the_median_of_bytes_is_counted(seed: int):
+    rng = np.random.default_rng(seed)
+    values = rng.integers(0, rng.integers(2, 256), (7, 9), dtype=np.uint8)
+    assert upper_median(values) == int(np.median(values))
 
 
 def test_a_camera_that_stands_still_has_not_moved_whoever_walks():

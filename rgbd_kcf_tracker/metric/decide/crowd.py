@@ -302,6 +302,8 @@ class Crowd:
         self._next = 1
         self._frames = 0
         self._mix_ups = MixUps()
+        self._known: list[Looks] = []
+        self._everyone: Looks | None = None
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
@@ -416,7 +418,7 @@ class Crowd:
         known = [p.gallery.looks for p in self.people if p.gallery.looks is not None]
         best: list[list[float]] = []
         if known:
-            everyone = Looks.joined(known)
+            everyone = self._joined(known)
             alike = np.stack([similarity(sight.view, everyone) for sight in sights], axis=1)
             starts = np.cumsum([0] + [len(each) for each in known[:-1]])
             best = np.maximum.reduceat(alike, starts, axis=0).tolist()
@@ -432,6 +434,17 @@ class Crowd:
                 odds[row] -= RETURN * (1 - float(np.exp((person.seen_at - time) / GONE)))
         odds += looks
         return odds, looks, alike
+
+    def _joined(self, known: list[Looks]) -> Looks:
+        """All of some looks, which mostly are the same as in the frame before."""
+        last = self._known
+        if (
+            self._everyone is None
+            or len(known) != len(last)
+            or any(now is not before for now, before in zip(known, last, strict=True))
+        ):
+            self._known, self._everyone = known, Looks.joined(known)
+        return self._everyone
 
     def learn(
         self,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -82,11 +83,11 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         expected: ``(n, 2)`` metres across and deep, where people are expected.
     """
     mask = scene.before & scene.standing
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
+    x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
+    if not width:
         return []
     # Mostly few pixels stand before the room: only where they are is anything to be cut.
-    part = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    part = slice(y, y + height), slice(x, x + width)
     pieces = surfaces_in(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
     for members in _joined(scene, pieces, scene.forward[part]):

@@ -36,19 +36,32 @@ class Light:
 
     def __init__(self) -> None:
         self.gain = np.ones(3)
+        self._mean = np.ones(3)
         self._first: npt.NDArray[np.float32] | None = None
 
     def restart(self) -> None:
         """Forget what the room looked like, but not the light: the camera looks elsewhere."""
         self._first = None
 
-    def steadied(self, image: Image, still: npt.NDArray[np.bool_]) -> Image:
+    def steadied(self, image: Image, still: npt.NDArray[np.bool_], learns: bool = True) -> Image:
         """An image ``(h, w, 3)`` BGR in the light of the first.
 
         Args:
             image: of the view's size.
             still: ``(h, w)`` bool, the pixels that show the room.
+            learns: whether the light is measured whether or not it seems to have changed.
         """
+        mean = np.array(cv2.mean(image)[:3]) + 1.0
+        if learns or np.abs(mean / self._mean - 1).max() > UNCHANGED:
+            self._mean = mean
+            self._measure(image, still)
+        if np.abs(self.gain - 1).max() < UNCHANGED:
+            return image
+        table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)
+        result: Image = cv2.LUT(image, table[None])
+        return result
+
+    def _measure(self, image: Image, still: npt.NDArray[np.bool_]) -> None:
         small = image[::STRIDE, ::STRIDE].astype(np.float32)
         if self._first is None or self._first.shape != small.shape:
             self._first = small * self.gain.astype(np.float32)
@@ -59,8 +72,3 @@ class Light:
             if np.count_nonzero(usable) >= LEAST_PIXELS:
                 gain = np.median(self._first[usable] / small[usable], axis=0)
                 self.gain = np.clip(gain, 1 / LARGEST_GAIN, LARGEST_GAIN).astype(np.float64)
-        if np.abs(self.gain - 1).max() < UNCHANGED:
-            return image
-        table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)
-        result: Image = cv2.LUT(image, table[None])
-        return result

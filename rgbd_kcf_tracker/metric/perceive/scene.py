@@ -170,7 +170,7 @@ class SceneReader:
                 somebody = None
             self.room.update(view.depth, seconds, somebody, surfaces, learns)
         before = self.room.before
-        image = self._light.steadied(image, ~before)
+        image = self._light.steadied(image, ~before, learns)
         since = self._since if learns else None
         if learns:
             self._since = 0.0

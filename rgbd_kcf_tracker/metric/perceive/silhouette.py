@@ -226,15 +226,16 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
         return Sides(False, False, False, False)
     body = np.zeros(nearer.shape, np.bool_)
     body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
-    nearer &= ~body
+    outside = ~body
+    nearer &= outside
     # Between two surfaces there often is a seam without a reading.
     nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
+    nearer &= outside
 
     def hidden(to: tuple[slice, slice], of: tuple[slice, slice]) -> bool:
         """Along the side on which the pixels ``to`` lie beyond those ``of`` the body."""
-        beyond = body[of] & ~body[to]
-        total = int(np.count_nonzero(beyond))
-        return total > 0 and int(np.count_nonzero(nearer[to] & beyond)) > CUT_SHARE * total
+        hiding = int(np.count_nonzero(nearer[to] & body[of]))
+        return hiding > 0 and hiding > CUT_SHARE * int(np.count_nonzero(outside[to] & body[of]))
 
     first, last = np.s_[:-RING], np.s_[RING:]
     return Sides(
