@@ -224,7 +224,8 @@ def test_bad_values_say_what_to_write(
     # As for `evaluate` a key may name the tracker.
     kcf = *track, '--variant', 'kcf', '--param'
     assert 'padding' in fails(capsys, *kcf, 'kcf.padding=-5')
-    assert 'the tracker is kcf, not metric' in fails(capsys, *kcf, 'metric.view_width=200')
+    assert "the tracker is kcf, not 'metric'" in fails(capsys, *kcf, 'metric.view_width=200')
+    assert "the tracker is kcf, not ''" in fails(capsys, *kcf, '.view_width=200')
     assert 'frames 0 to 11' in fails(capsys, *track, '--start', '12')
     assert 'above --start 5' in fails(capsys, *track, '--start', '5', '--end', '5')
     for fps in ('0', '-5', '1e-300', 'inf', 'nan'):

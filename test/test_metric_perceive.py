@@ -362,13 +362,14 @@ def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
 @pytest.mark.parametrize(
     ('rate', 'wanted'),
     [
-        (30, [0.1, None, None, 0.1, None, None, 0.1]),
-        (15, [0.09, None, 2 / 15, None, 2 / 15]),
+        (30, [0.1, None, 2 / 30, None, 2 / 30]),
+        (60, [0.1, None, None, 3 / 60, None, None, 3 / 60]),
+        (15, [0.1, 1 / 15, 1 / 15]),
         (10, [0.1, 0.1, 0.1]),
         (5, [0.2, 0.2]),
     ],
 )
-def test_what_lasts_is_learned_ten_times_a_second_at_the_most(
+def test_what_lasts_is_learned_some_twenty_times_a_second_at_the_most(
     rate: int, wanted: list[float | None]
 ):
     reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)

@@ -205,7 +205,7 @@ def tracker_parameters(args: argparse.Namespace, variant: str) -> Parameters:
     for key, value in parse_assignments(args.param).items():
         owner, dot, name = key.rpartition('.')
         if dot and owner != variant:
-            raise ParameterError(f'--param {key}: the tracker is {variant}, not {owner}')
+            raise ParameterError(f'--param {key}: the tracker is {variant}, not {owner!r}')
         given[name] = value
     return with_overrides(default_parameters(variant), given)
 

@@ -180,6 +180,7 @@ class Room:
         if len(open_):
             np.put(before, open_, self._taken(open_, depth, dt, allowed, same, surfaces))
         self.before, self.still = before, same
+        np.copyto(self.depth, depth, where=valid & ~known & ~before)
         self._blind *= ~both
         np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
         # A view of which most is missing says nothing of the place.
@@ -191,13 +192,11 @@ class Room:
         self._unlearned += dt
         if not learns:
             return
-        again = farther & (np.abs(depth - self._farther) <= allowed)
         nearer *= same
         nearer *= np.float32(BLEND)
         self.depth -= nearer
-        fresh = valid & ~known & ~before
-        fresh |= again
-        np.copyto(self.depth, depth, where=fresh)
+        again = farther & (np.abs(depth - self._farther) <= allowed)
+        np.copyto(self.depth, depth, where=again)
         self._farther = depth * farther
         self._settle(depth, self._unlearned, allowed, somebody)
         self._unlearned = 0.0

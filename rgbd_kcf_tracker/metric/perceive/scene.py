@@ -25,10 +25,9 @@ from rgbd_kcf_tracker.pose import Pose
 
 STILL, STILL_TURN = 0.003, 0.001
 """Metres and radians, a fifth of a pixel of the view, up to which a camera with poses stands."""
-LEARNING_STEP = 0.09
+LEARNING_STEP = 0.045
 """Seconds after which what lasts (room, floor, looks, colours) is learned again while the
-camera stands: at 30 Hz from every third frame, which saves a sixth of the time, and at 10 Hz, at
-which most is measured, from each."""
+camera stands: at 30 Hz from every second frame, and at 15 Hz and less from each."""
 
 
 @dataclass(frozen=True, eq=False)
