@@ -176,11 +176,12 @@ class Room:
         before = both & (nearer > allowed)
         farther = both & (nearer < -allowed)
         same = both & ~(before | farther)
-        open_ = np.flatnonzero(valid & ~known & (self._blind >= BLIND_FRAMES))
+        new = valid & ~known
+        open_ = np.flatnonzero(new & (self._blind >= BLIND_FRAMES))
         if len(open_):
             np.put(before, open_, self._taken(open_, depth, dt, allowed, same, surfaces))
         self.before, self.still = before, same
-        np.copyto(self.depth, depth, where=valid & ~known & ~before)
+        np.copyto(self.depth, depth, where=new & ~before)
         self._blind *= ~both
         np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
         # A view of which most is missing says nothing of the place.
