@@ -5,16 +5,16 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import signal
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+
+from rgbd_kcf_tracker.bench.domains import reserved_domain
 
 if TYPE_CHECKING:
     from ros_rig import Rig
@@ -31,30 +31,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 PROJECT = Path(__file__).resolve().parent.parent
-# Above 101 the ports of a domain fall into Linux's ephemeral range, until 215.
-DOMAINS = (*range(1, 102), *range(215, 233))
-
-
-@contextmanager
-def reserved_domain() -> Iterator[int]:
-    """A ROS domain id that no other test of this machine has, whatever process it runs in.
-
-    A file lock marks the domain as taken; the kernel releases it when the process dies.
-    """
-    folder = Path(tempfile.gettempdir()) / f'rgbd_kcf_tracker_domains_{os.getuid()}'
-    folder.mkdir(exist_ok=True)
-    # Each process starts at another place, so that a domain is not reused at once.
-    start = os.getpid() * 7
-    for offset in range(len(DOMAINS)):
-        domain = DOMAINS[(start + offset) % len(DOMAINS)]
-        with (folder / str(domain)).open('w') as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                continue
-            yield domain
-            return
-    pytest.fail('every ROS domain id is taken by another running test')
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from rgbd_kcf_tracker.bench.demo_nodes import DemoError, keep_to_this_machine, last_line, node
+from rgbd_kcf_tracker.bench.demo_nodes import DemoError, kept_to_this_machine, last_line, node
 from rgbd_kcf_tracker.cli.common import add_overwrite_option
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
@@ -90,11 +90,11 @@ def _demo(options: argparse.Namespace) -> None:
             old.unlink()
     except OSError as error:
         raise DemoError(f'{dest} cannot be written: {error.strerror or error}') from None
-    keep_to_this_machine(logs)
     bag = dest / 'recording.mcap'
-    truth = _simulate(options, bag)
-    lockstep = _run(options, truth, bag, logs, lockstep=True, record=dest / 'tracker.mcap')
-    live = _run(options, truth, bag, logs, lockstep=False, record=None)
+    with kept_to_this_machine(logs):
+        truth = _simulate(options, bag)
+        lockstep = _run(options, truth, bag, logs, lockstep=True, record=dest / 'tracker.mcap')
+        live = _run(options, truth, bag, logs, lockstep=False, record=None)
     ordered = [lockstep.tracks.get(stamp) for stamp in truth.stamps]
     _write_results(options, truth, ordered, bag, dest)
     _print_table(options, truth, lockstep, live)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from rgbd_kcf_tracker.bench.domains import reserved_domain
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
 STOP_S = 20.0
@@ -24,19 +24,20 @@ class DemoError(RgbdKcfError):
     """A step of the demo failed."""
 
 
-def keep_to_this_machine(log_folder: Path) -> None:
+@contextmanager
+def kept_to_this_machine(log_folder: Path) -> Iterator[None]:
     """Set this process's ROS environment, which its children take over.
 
     A domain of its own, this host only, found without multicast too (containers often have none),
-    and logs beside the results instead of in the home folder. Domains above 101 would take ports
-    from the range in which Linux gives them to others.
+    and logs beside the results instead of in the home folder.
     """
-    log_folder.mkdir(parents=True, exist_ok=True)
-    os.environ['ROS_DOMAIN_ID'] = str(random.randint(10, 100))
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_STATIC_PEERS'] = '127.0.0.1'
-    os.environ['ROS_LOG_DIR'] = str(log_folder)
-    os.environ.pop('ROS_LOCALHOST_ONLY', None)
+    with reserved_domain() as domain:
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        os.environ['ROS_STATIC_PEERS'] = '127.0.0.1'
+        os.environ['ROS_LOG_DIR'] = str(log_folder)
+        os.environ.pop('ROS_LOCALHOST_ONLY', None)
+        yield
 
 
 @contextmanager

@@ -1,0 +1,54 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""A ROS domain for oneself: what runs at the same time on this machine is not heard."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import RgbdKcfError
+
+DOMAINS = (*range(1, 102), *range(215, 233))
+"""Between those the ports of a domain fall into the range that Linux gives to others."""
+
+
+@contextmanager
+def reserved_domain() -> Iterator[int]:
+    """A ROS domain id that nobody else of this user who asks here has, in whatever process.
+
+    A file lock marks the domain as taken; the kernel releases it when the process dies. The one in
+    ``ROS_DOMAIN_ID`` is left to the robot that may be in it.
+
+    Raises:
+        RgbdKcfError: where all are taken, or no lock can be made.
+    """
+    folder = Path(tempfile.gettempdir()) / f'rgbd_kcf_tracker_domains_{os.getuid()}'
+    given = os.environ.get('ROS_DOMAIN_ID')
+    # Each process starts at another place, so that a domain is not reused at once.
+    start = os.getpid() * 8
+    for offset in range(len(DOMAINS)):
+        domain = DOMAINS[(start + offset) % len(DOMAINS)]
+        if str(domain) == given:
+            continue
+        try:
+            folder.mkdir(exist_ok=True)
+            lock = (folder / str(domain)).open('a')
+        except OSError as error:
+            raise RgbdKcfError(
+                f'no ROS domain can be reserved in {folder}: {error.strerror or error}; '
+                'set TMPDIR to a folder that can be written'
+            ) from None
+        with lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RgbdKcfError(f'all {len(DOMAINS)} ROS domains are taken by what runs on this machine')
