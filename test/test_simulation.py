@@ -209,7 +209,9 @@ def test_same_seed_same_frames_in_any_order() -> None:
     assert not np.array_equal(other.frame.color, one[0].frame.color)
 
 
-@pytest.mark.parametrize('name', ['camera_motion', 'light_change', 'missing_depth', 'lookaround'])
+@pytest.mark.parametrize(
+    'name', ['camera_motion', 'light_change', 'missing_depth', 'lookaround', 'following']
+)
 def test_rates_sample_the_same_world(name: str) -> None:
     fast = simulate(name, seed=2, rate_hz=30, size=SMALL)
     slow = simulate(name, seed=2, rate_hz=5, size=SMALL)

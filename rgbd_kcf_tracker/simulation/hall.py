@@ -68,19 +68,26 @@ class Hall:
 
     Args:
         stage: source of randomness; its ``depth`` and ``half_width`` are set.
-        things: fewest and most pieces that stand in the middle.
+        things: fewest and one more than most pieces that stand in the middle.
+        depth: metres to the wall at the back, least and most.
+        half_width: metres to the walls at the sides, least and most.
     """
 
-    def __init__(self, stage: Stage, things: tuple[int, int] = (2, 5)) -> None:
+    def __init__(
+        self, stage: Stage, things: tuple[int, int] = (2, 5),
+        depth: tuple[float, float] = (4.7, 6.2), half_width: tuple[float, float] = (4.3, 5.4),
+    ) -> None:  # fmt: skip
         self.stage = stage
         rng = stage.rng
-        stage.depth = stage.uniform(4.7, 6.2)
-        stage.half_width = stage.uniform(4.3, 5.4)
+        stage.depth = stage.uniform(*depth)
+        stage.half_width = stage.uniform(*half_width)
         self.room = random_room(rng, stage.depth, stage.half_width, 0, HEIGHT)
         self.plan = FloorPlan()
         self.seats: list[Seat] = []
         self.niches: list[Niche] = []
-        self.door = stage.x(stage.uniform(-0.6, 0.6), stage.depth)
+        farthest = stage.half_width - 0.9
+        door = stage.x(stage.uniform(-0.6, 0.6), stage.depth)
+        self.door = min(max(door, -farthest), farthest)
         self._door_width = stage.uniform(0.95, 1.2)
         self._open_door()
         for _ in range(int(rng.integers(3, 8))):

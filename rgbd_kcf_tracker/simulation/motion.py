@@ -112,6 +112,8 @@ class CameraMotion:
         slide: ``(seconds, metres)`` keys of a move to the right.
         shake: amplitude of the hand's shake, radians.
         waves: frequency in hertz and phase of each wave of the shake, ``(5, n, 2)``.
+        way: of what carries it, ``(n, 4)`` seconds, metres to the right and ahead, and radians to
+            the right; None where it stays.
     """
 
     height: float
@@ -120,11 +122,12 @@ class CameraMotion:
     slide: Keys = ()
     shake: float = 0.0
     waves: Vector = field(default_factory=lambda: np.zeros((5, 0, 2)))
+    way: Vector | None = None
 
     @property
     def fixed(self) -> bool:
         """Whether it never moves."""
-        return not self.pan and not self.slide and self.shake == 0
+        return not self.pan and not self.slide and self.shake == 0 and self.way is None
 
     def at(self, t: float) -> tuple[Vector, Vector]:
         """Rotation (world to camera) and position at ``t`` seconds."""
@@ -132,14 +135,17 @@ class CameraMotion:
         if self.shake:
             f, p = self.waves[..., 0], self.waves[..., 1]
             wave = (np.sin(2 * np.pi * f * t + p) / (0.4 + f)).sum(axis=1) * self.shake
-        yaw = _eased(t, self.pan) + wave[0]
+        x = z = course = 0.0
+        if self.way is not None:
+            x, z, course = (float(np.interp(t, self.way[:, 0], v)) for v in self.way[:, 1:].T)
+        yaw = course + _eased(t, self.pan) + wave[0]
         pitch, roll = self.pitch + wave[1], 0.6 * wave[2]
         cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
         cr, sr = math.cos(roll), math.sin(roll)
         turn = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
         nod = np.array([[1, 0, 0], [0, cp, -sp], [0, sp, cp]])
         tilt = np.array([[cr, sr, 0], [-sr, cr, 0], [0, 0, 1]])
-        place = np.array([_eased(t, self.slide) + wave[3], -self.height + wave[4], 0.0])
+        place = np.array([x + _eased(t, self.slide) + wave[3], -self.height + wave[4], z])
         return tilt @ nod @ turn, place
 
 

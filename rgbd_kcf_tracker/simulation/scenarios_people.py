@@ -10,10 +10,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from rgbd_kcf_tracker.simulation.actors import VisitorActor
+from rgbd_kcf_tracker.simulation.driving import drive_behind
 from rgbd_kcf_tracker.simulation.floorplan import Point
 from rgbd_kcf_tracker.simulation.hall import DOOR, Exit, Hall
-from rgbd_kcf_tracker.simulation.motion import CameraMotion, hand_waves
+from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, hand_waves
 from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.stage import Stage, scenario
 from rgbd_kcf_tracker.simulation.walking import Action, Away, Go, Stay, Visit, Walker, rehearse
@@ -192,12 +195,14 @@ def _come_and_go(hall: Hall, people: list[Person], seconds: float) -> list[_Diar
 
 def _scene(
     hall: Hall, diaries: list[_Diary], seconds: float,
-    camera: CameraMotion | None = None,
+    camera: CameraMotion | Callable[[list[list[Visit]]], CameraMotion] | None = None,
     light: Callable[[list[list[Visit]]], Callable[[float], Gain]] | None = None,
 ) -> World:  # fmt: skip
-    """Let them carry out their plans; ``light`` may depend on when they are there."""
+    """Let them carry out their plans; ``camera`` and ``light`` may depend on where they are."""
     stage = hall.stage
     visits = rehearse([diary.walker() for diary in diaries], hall.plan, seconds)
+    if callable(camera):
+        camera = camera(visits)
     cast: list[Actor] = [
         VisitorActor(diary.person, tuple(each), stage.depth)
         for diary, each in zip(diaries, visits, strict=True)
@@ -366,3 +371,83 @@ def lookaround(stage: Stage) -> World:
     camera = CameraMotion(stage.camera_height, stage.pitch, keys, shake=shake,
                           waves=hand_waves(stage.rng))  # fmt: skip
     return _scene(hall, diaries, seconds, camera=camera)
+
+
+@several('a robot drives behind the target through a long hall, past people who come, cross, stand')
+def following(stage: Stage) -> World:
+    """The camera is on the robot; others pass between the two, overtake, and come towards them."""
+    stage.place_camera(0.7, 1.3)
+    hall = Hall(stage, (0, 1), depth=(13.0, 17.0), half_width=(2.6, 3.6))
+    diaries = [_Diary(hall, person) for person in _people(stage, 4, 6)]
+    target, *others = diaries
+    target.speed = stage.uniform(0.7, 1.05)
+    target.begin((stage.uniform(-0.3, 0.3), stage.uniform(1.8, 2.4)))
+    target.stay(stage.uniform(1.0, 2.0))
+    seen_at = [(target.now, target.place[1])]
+    while target.place[1] < stage.depth - 2.6:
+        ahead = min(target.place[1] + stage.uniform(1.5, 3.5), stage.depth - 1.8)
+        target.go((stage.uniform(-0.6, 0.6), ahead))
+        seen_at.append((target.now, ahead))
+        if stage.rng.uniform() < 0.4:
+            target.look_about(stage.uniform(0.5, 2.5))
+            seen_at.append((target.now, ahead))
+    target.stay(2.0)
+    parts = [_come_towards, _cross_behind, _overtake, _stand_about]
+    for k, other in enumerate(others):
+        chosen = k if stage.rng.uniform() < 0.8 else int(stage.rng.integers(len(parts)))
+        parts[chosen % len(parts)](other, seen_at, target.speed)
+
+    def on_robot(visits: list[list[Visit]]) -> CameraMotion:
+        walk = visits[0][0].motion
+        way = drive_behind(
+            lambda t: (walk.value('x', t), walk.value('z', t)), stage.uniform(1.9, 2.5), target.now
+        )
+        return CameraMotion(stage.camera_height, stage.pitch, shake=stage.uniform(0.001, 0.003),
+                            waves=hand_waves(stage.rng), way=way)  # fmt: skip
+
+    return _scene(hall, diaries, target.now, camera=on_robot)
+
+
+def _beside_the_way(stage: Stage) -> float:
+    """Metres to the right of somebody who is not run over."""
+    return stage.sign() * stage.uniform(1.15, stage.half_width - 0.9)
+
+
+def _come_towards(diary: _Diary, _: Keys, __: float) -> None:
+    """Walk past the two."""
+    stage = diary.stage
+    x = _beside_the_way(stage)
+    diary.begin((x, stage.uniform(5.5, stage.depth - 1.5)))
+    diary.wait_until(stage.uniform(0.0, 4.0))
+    diary.go((x, 1.0))
+    diary.go((x, -1.5))
+
+
+def _cross_behind(diary: _Diary, target_at: Keys, target_speed: float) -> None:
+    """Walk from one wall to the other just behind the target, before the robot."""
+    stage, side = diary.stage, diary.stage.sign()
+    wall, ahead = stage.half_width - 0.7, stage.uniform(3.5, stage.depth - 4.0)
+    times, places = zip(*target_at, strict=True)
+    passed = float(np.interp(ahead, places, times)) + stage.uniform(0.2, 1.0) / target_speed
+    diary.begin((side * wall, ahead))
+    diary.wait_until(passed - 0.9 * wall / diary.speed)
+    diary.go((-side * wall, ahead + stage.uniform(-0.3, 0.3)))
+    diary.look_about(30.0)
+
+
+def _overtake(diary: _Diary, _: Keys, target_speed: float) -> None:
+    """Come from behind, faster, and walk on before the target."""
+    stage, side = diary.stage, diary.stage.sign()
+    diary.speed = target_speed * stage.uniform(1.25, 1.5)
+    diary.begin((side * 1.2, -1.2))
+    diary.wait_until(stage.uniform(1.0, 6.0))
+    diary.go((side * stage.uniform(1.1, 1.3), 5.0))
+    diary.go((side * stage.uniform(0.7, 1.2), 9.0))
+    diary.go((stage.uniform(-0.5, 0.5), stage.depth - 1.2))
+    diary.look_about(20.0)
+
+
+def _stand_about(diary: _Diary, _: Keys, __: float) -> None:
+    """Stand by the way."""
+    diary.begin((_beside_the_way(diary.stage), diary.stage.uniform(3.0, diary.stage.depth - 2.0)))
+    diary.look_about(60.0)

@@ -164,7 +164,7 @@ class Sensor:
             bad[:, self._outside] = True
         np.copyto(z, mixed, where=edge)
         z += noise
-        bad |= z < np.float32(0.5)
+        bad |= (z < np.float32(0.5)) | (z > np.float32(8.5))
         z *= 1000
         np.rint(z, out=z)
         z *= np.float32(0.001)
