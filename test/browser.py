@@ -111,14 +111,26 @@ class Page:
         self.mouse('mousePressed', x, y)
         self.mouse('mouseReleased', x, y, 0)
 
-    def press(self, selector: str) -> None:
-        """Click on an element, scrolled into view first."""
-        x, y = self.value(
-            f'(() => {{ const e = document.querySelector({json.dumps(selector)}); '
-            "e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect(); "
-            'return [b.x + b.width / 2, b.y + b.height / 2]; })()'
+    def press(self, selector: str, seconds: float = 30) -> None:
+        """Click on an element once it lies still and nothing covers it, scrolled into view.
+
+        What comes to the page meanwhile may move an element between the look and the click.
+        """
+        still = (
+            f'(async () => {{ const e = document.querySelector({json.dumps(selector)}); '
+            "if (!e) return null; e.scrollIntoView({block: 'center'}); let last = ''; "
+            'for (let same = 0; same < 3;) { await new Promise(requestAnimationFrame); '
+            'const b = e.getBoundingClientRect(), x = b.x + b.width / 2, y = b.y + b.height / 2; '
+            'if (!b.width || !e.contains(document.elementFromPoint(x, y))) return null; '
+            'same = last === `${x} ${y}` ? same + 1 : 0; last = `${x} ${y}`; '
+            'if (same === 2) return [x, y]; } })()'
         )
-        self.click(x, y)
+        end = time.monotonic() + seconds
+        while (place := self.value(still)) is None:
+            if time.monotonic() > end:
+                raise AssertionError(f'{selector} cannot be clicked')
+            time.sleep(0.05)
+        self.click(*place)
 
     def picture(self, path: Path, *, whole: bool = True) -> None:
         data = self.call('Page.captureScreenshot', format='png', captureBeyondViewport=whole)

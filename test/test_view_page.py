@@ -317,6 +317,12 @@ def test_a_lost_connection_is_said_and_found_again(chromium: Browser, served: Se
     served.server.stop()
     page.until("document.getElementById('banner').textContent.startsWith('Connection lost')")
     assert page.value("!document.getElementById('banner').hidden")
+    # A box that is being drawn must not slip away under the hand.
+    canvas = "document.getElementById('picture').getBoundingClientRect().top"
+    tops = f"""(banner => {{ const tops = [{canvas}]; banner.hidden = true; tops.push({canvas});
+        banner.hidden = false; return tops; }})(document.getElementById('banner'))"""
+    shown, hidden = page.value(tops)
+    assert shown == hidden
     served.restart()
     page.until("document.getElementById('banner').hidden && page.socket.readyState === 1", 40)
     drawn = page.value('page.drawn')
