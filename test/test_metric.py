@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.simulation import simulate
@@ -279,6 +279,35 @@ def answers(frames: list[Frame], truth: list[Box | None], first: int, end: int) 
 
 
 @pytest.mark.slow
+def test_who_comes_out_from_behind_another_before_a_robot_that_drives_is_not_the_room():
+    """What was seen there for the first time was taken for what stands there, the target too."""
+    sequence = simulate('following', seed=14, rate_hz=10, size=(640, 480))
+    targets, number, wrong = TargetSet('metric'), -1, 0
+    for i in range(100, 150):
+        sample = sequence[i]
+        visible = sample.truths[1].visible
+        if i == 100:
+            assert visible is not None
+            number = targets.add(sample.frame, visible)
+            continue
+        box = targets.update(sample.frame)[number].box
+        wrong += visible is not None and (box is None or box.iou(visible) < 0.5)
+    assert wrong < 10, 'half of it without'
+
+
+def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():
+    """Chosen while both were one figure; later an arm joins them, though both are known by then."""
+    sequence = simulate('lookaround', seed=41, rate_hz=10, size=(640, 480))
+    tracker = create_tracker('metric')
+    for i in range(20):
+        sample = sequence[i]
+        visible = sample.truths[1].visible
+        assert visible is not None
+        track = tracker.start(sample.frame, visible) if i == 0 else tracker.update(sample.frame)
+        assert track.box is not None
+        assert track.box.iou(visible) > (0.6 if i > 1 else 0.5)
+
+
 def test_real_people_at_5_hz(shared_data: Path):
     folder = shared_data / 'rgbd' / 'filinha'
     frames = frames_of(folder, 5.0, XTION, depth=True)

@@ -28,7 +28,7 @@ from people_rig import (
 )
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
-from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
@@ -684,7 +684,9 @@ def test_who_passes_before_a_half_hidden_target_is_not_taken_for_it():
         frame = picture([target, passer], 0.1 * i, board)
         track = tracker.start(frame, target.box) if i == 0 else tracker.update(frame)
         assert track.box is not None
-        assert track.box.iou(target.box) > 0.5 > track.box.iou(passer.box)
+        # All of him by his look, or the part that shows beside the board, once that is a figure.
+        assert track.box.iou(target.box) > 0.4
+        assert track.box.iou(passer.box) < 0.5
         assert track.depth is None or track.depth > 3.4
 
 
@@ -747,6 +749,55 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
     assert (track.box is not None) == (own and pace < 2)
     if track.box is not None:
         assert track.box.iou(one.box) > 0.9
+
+
+def test_a_look_does_not_go_over_to_who_stood_beside_in_the_first_frame(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Depth shows nothing of the target, but of him, who is somebody else."""
+    one, other = Someone(-0.8, 3.5), Someone(0.7, 2.5)
+    monkeypatch.setattr(ByLook, 'step', lambda *args: Look(other.box, 1.0, other.z))
+    tracker = create_tracker('metric')
+    for i in range(6):
+        color, depth = images([one, other])
+        depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert i == 0 or track.box is None
+
+
+@pytest.mark.parametrize('side', [-1, 1])
+def test_of_two_who_are_one_figure_at_first_the_one_that_was_drawn_about_is_the_target(side: int):
+    """Their heads are too close to be told apart; the box says where the target ends."""
+    tracker = create_tracker('metric')
+    for i in range(14):
+        one = Someone(-0.16 * side, 3.0)
+        # He stays for a while and goes away.
+        other = Someone((0.16 + 0.08 * max(i - 7, 0)) * side, 3.06, trousers=BLUE)
+        frame = picture([one, other], 0.1 * i)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert track.box is not None
+        assert track.box.iou(one.box) > 0.75
+
+
+def test_both_of_two_who_are_one_figure_may_be_chosen():
+    targets, numbers = TargetSet('metric'), []
+    for i in range(14):
+        step = 0.08 * max(i - 7, 0)
+        pair = Someone(-0.16 - step, 3.0), Someone(0.16 + step, 3.06, GREEN, BLUE)
+        frame = picture(list(pair), 0.1 * i)
+        if i == 0:
+            # Of the farther one the nearer hides a part.
+            b = pair[1].box
+            right = Box.from_corners(pair[0].box.right, b.y, b.right, b.bottom)
+            numbers = [targets.add(frame, pair[0].box), targets.add(frame, right)]
+            assert numbers[0] != numbers[1]
+            continue
+        tracks = targets.update(frame)
+    for number, one in zip(numbers, pair, strict=True):
+        box = tracks[number].box
+        assert box is not None
+        assert box.iou(one.box) > 0.75
 
 
 @pytest.mark.parametrize('twin', [False, True])

@@ -160,6 +160,18 @@ def test_surfaces_part_where_depth_jumps_and_slopes_hold_together():
     assert tuple(surfaces.boxes[front]) == (60, 30, 40, 90)
 
 
+def test_a_mean_over_each_surface_is_that_of_its_pixels():
+    depth = wall()
+    depth[30:120, 60:100] = 2.0
+    depth[50:60, 90:240] = 1.0  # ends at the image's edge, and the next row begins with the wall
+    depth[::7, ::5] = 0
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
+    values = np.random.default_rng(0).random(depth.shape, np.float32)
+    wanted = [values[surfaces.labels == label].mean() for label in range(len(surfaces))]
+    assert len(surfaces) > 3
+    np.testing.assert_allclose(surfaces.means(values), wanted, rtol=1e-5)
+
+
 def test_silhouette_knows_what_cuts_it_off():
     depth = wall()
     depth[40:120, 80:110] = 2.5

@@ -183,6 +183,21 @@ def test_the_room_is_seen_from_where_the_camera_has_moved_to():
     assert room.before.mean() < 0.01
 
 
+def test_what_goes_on_from_somebody_as_one_surface_is_somebody():
+    """Before a camera that moves, half of whom somebody else hid was taken for the room."""
+    room = known_room(wall())
+    half = with_thing()
+    half[:, 80:] = WALL
+    see(room, half, 0.1, None)
+    room.depth[:, 80:] = 0  # somebody nearer has hidden all that is there
+    depth = with_thing()
+    going_on = room.going_on(depth, surfaces_in(depth, depth > 0, 0.04, 0.03))
+    assert (going_on == (depth < WALL)).all(), 'and the wall behind goes on as the wall'
+    room.depth[:, 65:] = 0
+    few = room.going_on(depth, surfaces_in(depth, depth > 0, 0.04, 0.03))
+    assert not few.any(), 'a few pixels tell nothing of the rest'
+
+
 def test_a_room_elsewhere_does_not_agree():
     room = known_room(with_thing())
     assert room.agrees(with_thing())
@@ -498,6 +513,17 @@ def test_two_people_who_touch_are_parted(expected: np.ndarray, half: float):
     found = sorted(figures, key=lambda figure: figure.place[0])
     for figure, one in zip(found, people, strict=True):
         assert outline(figure.seen).iou(one.box) > 0.85
+
+
+def test_who_stands_half_behind_another_is_not_joined_with_him():
+    """Within an arm's reach in depth, and too close for two heads side by side."""
+    people = [Someone(-0.13, 3.0), Someone(0.13, 3.28)]
+    figures = find_figures(scene_of(people), NONE_EXPECTED)
+    assert len(figures) == 2
+    left, right = sorted(figures, key=lambda figure: figure.place[0])
+    assert outline(left.seen).iou(people[0].box) > 0.9
+    assert right.seen.at_edge(scene_of([]).view, Rim()) is False
+    assert not left.parted
 
 
 def test_somebody_who_waves_is_one():

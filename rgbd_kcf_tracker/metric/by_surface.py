@@ -19,7 +19,13 @@ from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, Account
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
-from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, Expectation, gathered, propose
+from rgbd_kcf_tracker.metric.decide.proposals import (
+    MIXED,
+    MOST_SHARE,
+    Expectation,
+    gathered,
+    propose,
+)
 from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
@@ -197,9 +203,9 @@ class BySurface:
         mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
         if np.count_nonzero(mine) < SCATTERED * mine.size:
             return None
-        v, u = np.flatnonzero(mine.any(axis=1)), np.flatnonzero(mine.any(axis=0))
-        mask = mine[v[0] : v[-1] + 1, u[0] : u[-1] + 1]
-        seen = Silhouette.of(scene.view, x0 + int(u[0]), y0 + int(v[0]), mask, 0, scene.rim)
+        seen = Silhouette.trimmed(scene.view, x0, y0, mine, scene.rim)
+        if seen is None:
+            return None
         # What little depth there is of a small thing in a hand may be the hand's.
         if seen.width * seen.height < SMALL or BySurface.outline(scene, seen).iou(box) < LOCK_IOU:
             return None
@@ -217,11 +223,7 @@ class BySurface:
         if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
             return seen
         part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
-        rows, cols = np.flatnonzero(part.any(axis=1)), np.flatnonzero(part.any(axis=0))
-        if not len(rows):
-            return seen
-        part = part[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
-        return Silhouette.of(scene.view, x0 + int(cols[0]), y0 + int(rows[0]), part, 0, scene.rim)
+        return Silhouette.trimmed(scene.view, x0, y0, part, scene.rim) or seen
 
     # -- one frame --------------------------------------------------------------------------------
 
@@ -249,7 +251,9 @@ class BySurface:
         missing = self._should_be_seen(scene) > 0.6
         others = account.others(self._person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
-        free = [seen for seen in found if others.share(seen) < STANDING]
+        # Where his own figure is known, what holds somebody else besides is no proposal.
+        most = STANDING if self._person not in account.owners else MIXED
+        free = [seen for seen in found if others.share(seen) < most]
         figures = [
             sight.figure.seen
             for kind, sight in enumerate(account.sights, FIRST)

@@ -341,7 +341,7 @@ class Follower:
         if index < 0 or account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
-        return owner.first_seen < self._since and owner.number not in self._about
+        return owner.first_seen <= self._since and owner.number not in self._about
 
     def _far(self, account: Account, box: Box) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it."""

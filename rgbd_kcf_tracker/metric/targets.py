@@ -14,8 +14,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-import numpy as np
-
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_surface import Candidate
@@ -31,6 +29,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track, TrackState, require_inside
@@ -87,9 +86,7 @@ class MetricTargets:
         follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
         if self.account is not None and follower.seen is not None:
             # Whoever stood there from the first frame on was taken for a part of the room.
-            mask = np.zeros(self.account.scene.view.shape, np.bool_)
-            mask[follower.seen.rows, follower.seen.cols] = follower.seen.mask
-            self._reader.room.open(mask, self.account.scene.view.depth)
+            self._reader.is_somebody(follower.seen)
         number = self._name(follower.person)
         self._followers[number] = follower
         return number
@@ -178,6 +175,11 @@ class MetricTargets:
         }
         self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()
+        # What a camera that moves sees for the first time, behind something, passes for the room.
+        if self._reader.stood_for < SETTLE:
+            for number, seen in targets.items():
+                if seen is not None and number not in unsure:
+                    self._reader.is_somebody(seen)
 
     def _name(self, person: Person | None) -> int:
         """The id of a person, or a new one."""

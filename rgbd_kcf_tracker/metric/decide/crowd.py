@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,7 +26,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import Figure, find_figures, place_of
+from rgbd_kcf_tracker.metric.perceive.figures import APART, UPRIGHT, Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
@@ -56,6 +57,9 @@ PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it."""
 BESIDE = 0.5
 """Metres between two who are surely two, and not a person and a piece of the same."""
+STRIP = 0.15
+"""Metres of a figure beside the part of it that was chosen from which that is somebody else, where
+it is taller than any limb: boxes are not drawn as narrow."""
 NEW_SCORE = 0.5
 """Score of somebody who has just come into view."""
 MOST_PEOPLE = 48
@@ -138,6 +142,11 @@ class Account:
     def parts(self) -> Parts:
         """Which of the sights, or the room, each pixel shows."""
         return Parts(self.scene, [sight.figure.seen for sight in self.sights])
+
+    @property
+    def owners(self) -> list[Person]:
+        """Whoever a sight of the frame is of."""
+        return [self.people[row] for row in self.owner if row >= 0]
 
     def place(self, seen: Silhouette) -> FloatArray:
         """Where a silhouette is, ``(2,)`` metres across and along the floor."""
@@ -318,17 +327,50 @@ class Crowd:
     def chosen(self, account: Account, seen: Silhouette) -> Person:
         """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
         index = account.figure_of(seen)
-        if index >= 0 and account.owner[index] >= 0:
-            person = account.people[account.owner[index]]
-            if account.time == person.seen_at:
+        owner = account.owner[index] if index >= 0 else -1
+        beside = (
+            [] if index < 0 else _beside(account.scene, account.sights[index].figure.seen, seen)
+        )
+        if owner >= 0:
+            person = account.people[owner]
+            if beside and person.first_seen == account.time:
+                other = self._new_at(account, seen, person)
+                if other is not None and not other.chosen:
+                    other.chosen = True
+                    return other
+                if not person.chosen and person in self.people:
+                    # Nobody: he was made of two, and looks like both.
+                    self.people.remove(person)
+            elif account.time == person.seen_at:
                 person.chosen = True
+                self._welcome_beside(account, person, beside)
                 return person
         person = self.welcome(account.place(seen), account.time, chosen=True)
         account.people.append(person)
         if index >= 0:
             account.owner[index] = len(account.people) - 1
         self._see(account, len(account.people) - 1, seen, index)
+        self._welcome_beside(account, person, beside)
         return person
+
+    def _new_at(self, account: Account, seen: Silhouette, but: Person) -> Person | None:
+        """Who else was welcomed in this very frame where a silhouette is."""
+        place = account.place(seen)
+        for person in self.people:
+            near = math.dist(person.place, place) < APART
+            if near and person is not but and person.first_seen == account.time:
+                return person
+        return None
+
+    def _welcome_beside(self, account: Account, person: Person, beside: list[Silhouette]) -> None:
+        for piece in beside:
+            if self._new_at(account, piece, person) is not None:
+                continue
+            other = self.welcome(account.place(piece), account.time)
+            account.people.append(other)
+            self._see(account, len(account.people) - 1, piece, -1)
+            other.met.add(person.number)
+            person.met.add(other.number)
 
     def explain(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
@@ -582,6 +624,17 @@ class Crowd:
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
             person.gallery.learn(view, account.time)
+
+
+def _beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:
+    """Who else a figure holds of which only a part was chosen: what stands on its sides."""
+    found = []
+    for left, right in ((figure.left, seen.left), (seen.cols.stop, figure.cols.stop)):
+        piece = figure.mask[:, max(left - figure.left, 0) : max(right - figure.left, 0)]
+        one = Silhouette.trimmed(scene.view, left, figure.top, piece, scene.rim)
+        if one is not None and one.width > STRIP and one.height > UPRIGHT:
+            found.append(one)
+    return found
 
 
 def _assigned(odds: FloatArray, sights: int) -> list[int]:

@@ -155,14 +155,7 @@ def _narrowed(
     score = 6 * profile / pixels - 0.5 * np.square(x - expected.position[0]) / spread
     first = int(np.argmax(score))
     part = seen.mask[:, first : first + cols]
-    rows = np.flatnonzero(part.any(axis=1))
-    across = np.flatnonzero(part.any(axis=0))
-    if not len(rows):
-        return None
-    part = part[rows[0] : rows[-1] + 1, across[0] : across[-1] + 1]
-    return Silhouette.of(
-        scene.view, seen.left + first + int(across[0]), seen.top + int(rows[0]), part, 0, scene.rim
-    )
+    return Silhouette.trimmed(scene.view, seen.left + first, seen.top, part, scene.rim)
 
 
 def gathered(

@@ -44,6 +44,9 @@ BREADTH = 0.4
 """Metres between the heads of two people side by side, at the least."""
 BROAD = BREADTH + 0.25
 """Metres from which a figure may be two people: those, and half a shoulder's width on each side."""
+UPRIGHT = 1.0
+"""Metres of height of each of two pieces beside each other, together at least :data:`BROAD`, from
+which they are two people: no limb is that tall."""
 VALLEY = 0.08
 """Metres by which the outline must fall between two heads."""
 HEAD_BELOW = 0.5
@@ -115,8 +118,7 @@ def _joined(
     possible[0] = False
     labels = np.flatnonzero(possible)
     labels = labels[np.argsort(-areas[labels], kind='stable')]
-    sums = np.bincount(pieces.labels.ravel(), forward.ravel(), len(pieces))
-    ahead = sums / np.maximum(pieces.pixels, 1)
+    ahead = pieces.means(forward)
     groups: list[list[int]] = []
     extents: list[tuple[float, float, float, float, float, float]] = []
     for label in labels:
@@ -131,8 +133,10 @@ def _joined(
             above = (max(top, y0) - min(bottom, y1)) * down
             wide = (max(right, x1) - min(left, x0)) * across
             tall = (max(bottom, y1) - min(top, y0)) * down
+            two = wide > BROAD and min(height, y1 - y0) * down > UPRIGHT
             if (
-                beside < GAP_BESIDE
+                not two
+                and beside < GAP_BESIDE
                 and above < GAP_ABOVE
                 and wide < max(WIDEST, (x1 - x0) * across + 0.1)
                 and tall < TALLEST

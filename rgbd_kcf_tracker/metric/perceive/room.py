@@ -30,6 +30,7 @@ BLIND_FRAMES = 3
 """Frames without a reading after which a pixel is known to have none: a reading there is new."""
 GONE_FRAMES = 2 * BLIND_FRAMES
 """Frames without a reading after which whatever was known of a pixel is not there any more."""
+_ANY_NUMBER = np.uint8(255 - BLIND_FRAMES)
 NEAREST = 0.15
 """Metres from the camera below which nothing is seen."""
 BLEND = 0.1
@@ -41,6 +42,9 @@ AGREEING = 0.5
 that has readings from which a view tells what has none any more."""
 MOST = 0.5
 """Share of a surface that is room from which all of it is."""
+GOES_ON = 0.25
+"""Share of a surface that must be known to stand before the room, and no less of it than is room,
+for the rest of it to be somebody too."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
@@ -150,6 +154,23 @@ class Room:
         lost: Mask = unknown & ~opened
         return lost
 
+    def going_on(self, depth: DepthArray, surfaces: Surfaces) -> Mask:
+        """Pixels, ``(h, w)`` bool, of surfaces of which what is known stands before the room.
+
+        Args:
+            depth: ``(h, w)`` metres of a view.
+            surfaces: of it.
+        """
+        valid, known = depth > 0, self.depth > 0
+        nearer = known & (self.depth - depth > tolerance(depth))
+        nearer |= ~known & (self._blind >= BLIND_FRAMES)
+        before = np.bincount(surfaces.labels[valid & nearer], minlength=len(surfaces))
+        room = np.bincount(surfaces.labels[valid & known & ~nearer], minlength=len(surfaces))
+        somebody = (before > room) & (before > GOES_ON * surfaces.pixels)
+        somebody[0] = False
+        result: Mask = somebody[surfaces.labels]
+        return result
+
     def update(
         self,
         depth: DepthArray,
@@ -183,10 +204,11 @@ class Room:
         self.before, self.still = before, same
         np.copyto(self.depth, depth, where=new & ~before)
         self._blind *= ~both
-        np.minimum(self._blind, BLIND_FRAMES, out=self._blind, where=valid)
+        missing = (~valid).view(np.uint8)
+        np.minimum(self._blind, missing * _ANY_NUMBER + BLIND_FRAMES, out=self._blind)
         # A view of which most is missing says nothing of the place.
         if valid.any() and np.count_nonzero(both) >= AGREEING * np.count_nonzero(known):
-            cv2.add(self._blind, (~valid).view(np.uint8), self._blind)  # stays at the highest
+            cv2.add(self._blind, missing, self._blind)  # stays at the highest
             # What was known of a pixel that has no reading any more was somebody, who has gone.
             gone = self._blind >= GONE_FRAMES
             self.depth[gone] = self._front[gone] = 0

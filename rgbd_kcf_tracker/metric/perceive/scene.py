@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -99,6 +100,7 @@ class SceneReader:
         somebody: ``(h, w)`` bool, pixels of the last view that belong to somebody, who may stand
             still without becoming part of the room; to be set by who decides. None for nobody.
         last_view: the depth of the last frame that had any.
+        stood_for: seconds for which the camera has stood still, 0 while it moves.
 
     Args:
         width: columns of the view.
@@ -121,11 +123,12 @@ class SceneReader:
         self._light = Light()
         self._ego = EgoMotion()
         self._pose: Pose | None = None
-        self._since, self._moving = LEARNING_STEP, False
+        self._since = LEARNING_STEP
         self.seems: Pose | None = None
         self.room = Room()
         self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
+        self.stood_for = math.inf
 
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
@@ -137,7 +140,7 @@ class SceneReader:
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
-        learns = self._moving or self._since >= LEARNING_STEP
+        learns = self.stood_for == 0.0 or self._since >= LEARNING_STEP
         floor = self._floors.update(view, learns) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
         forward = view.depth
@@ -153,7 +156,7 @@ class SceneReader:
         motion = self._move(image, view, frame.pose)
         if isinstance(motion, Lost) and self.room.agrees(view.depth):
             motion = None
-        self._moving = motion is not None
+        self.stood_for = self.stood_for + seconds if motion is None else 0.0
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
             people = upright_people(view, surfaces, elevation, self._rim)
@@ -164,6 +167,7 @@ class SceneReader:
             if isinstance(motion, Pose):
                 unknown = self.room.moved(motion, view.intrinsics)
                 people = upright_people(view, surfaces, elevation, self._rim)
+                people |= self.room.going_on(view.depth, surfaces)
                 self.room.open(people & unknown, view.depth)
                 self._light.restart()
                 somebody = None
@@ -188,6 +192,13 @@ class SceneReader:
             motion,
             since,
         )
+
+    def is_somebody(self, seen: Silhouette) -> None:
+        """Take the pixels of a silhouette of the last scene out of what stands still."""
+        if self.last_view is not None:
+            mask = np.zeros(self.last_view.shape, np.bool_)
+            mask[seen.rows, seen.cols] = seen.mask
+            self.room.open(mask, self.last_view.depth)
 
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None

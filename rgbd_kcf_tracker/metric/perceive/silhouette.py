@@ -202,6 +202,28 @@ class Silhouette:
         area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
         return cls(left, top, mask, label, z, area, cut, metres)
 
+    @classmethod
+    def trimmed(
+        cls, view: DepthView, left: int, top: int, mask: Mask, rim: Rim
+    ) -> Silhouette | None:
+        """A part of one, or of several: its crop is made no larger than its pixels.
+
+        Args:
+            view: the depth.
+            left: column of the crop.
+            top: row of the crop.
+            mask: ``(h, w)`` bool.
+            rim: of the view.
+
+        Returns:
+            None where the mask has no pixel.
+        """
+        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if not len(rows):
+            return None
+        part = mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        return cls.of(view, left + int(cols[0]), top + int(rows[0]), part, 0, rim)
+
 
 def _upper_end(values: npt.NDArray[np.float32]) -> float:
     """The 98th percentile of ``(n,)``: ``np.percentile`` takes five times as long."""
@@ -222,12 +244,12 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     y1, x1 = min(height, top + rows + RING), min(width, left + cols + RING)
     around = view.depth[y0:y1, x0:x1]
     nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z))
-    if not nearer.any():
-        return Sides(False, False, False, False)
     body = np.zeros(nearer.shape, np.bool_)
     body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
     outside = ~body
     nearer &= outside
+    if not nearer.any():
+        return Sides(False, False, False, False)
     # Between two surfaces there often is a seam without a reading.
     nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
     nearer &= outside

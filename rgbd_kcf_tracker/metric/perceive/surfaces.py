@@ -18,6 +18,26 @@ _BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Runs:
+    """The pixels of a view in runs of one label in a row: one for some ten pixels.
+
+    Attributes:
+        start: ``(m,)`` index of each run's first pixel in the flattened view.
+        label: ``(m,)`` int32.
+        count: of labels.
+    """
+
+    start: npt.NDArray[np.intp]
+    label: npt.NDArray[np.int32]
+    count: int
+
+    def sums(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+        """Sum over each label of an image, ``(h, w)``; ``(count,)``."""
+        of_runs = np.add.reduceat(values.ravel(), self.start)
+        return np.asarray(np.bincount(self.label, of_runs, self.count), np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
     """The surfaces of a view; row ``i`` of each array is the surface labelled ``i``, 0 is none.
 
@@ -27,6 +47,7 @@ class Surfaces:
         pixels: ``(n,)`` int32 number of pixels.
         depth: ``(n,)`` float32 mean depth in metres.
         jump, jump_per_metre: the depth step at which they were cut.
+        runs: of pixels of one label in a row.
     """
 
     labels: npt.NDArray[np.int32]
@@ -35,6 +56,7 @@ class Surfaces:
     depth: npt.NDArray[np.float32]
     jump: float
     jump_per_metre: float
+    runs: Runs
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -43,6 +65,11 @@ class Surfaces:
         """Square metres of each surface as seen from a camera, ``(n,)``."""
         z = self.depth.astype(np.float64)
         result: npt.NDArray[np.float64] = self.pixels * z * z / (k.fx * k.fy)
+        return result
+
+    def means(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+        """Mean over each surface of an image, ``(h, w)``; ``(n,)``, 0 where there is no pixel."""
+        result: npt.NDArray[np.float64] = self.runs.sums(values) / np.maximum(self.pixels, 1)
         return result
 
 
@@ -121,8 +148,8 @@ def _measured(
 ) -> Surfaces:
     """Boxes, pixels and mean depth of ``count`` labels.
 
-    By the runs of each row, of which there is one for some ten pixels: OpenCV's own statistics of
-    connected components, and the sums of depth, go from pixel to pixel and take twice as long.
+    By runs: OpenCV's own statistics of connected components, and the sums of depth, go from pixel
+    to pixel and take twice as long.
     """
     width = labels.shape[1]
     flat = labels.ravel()
@@ -132,10 +159,10 @@ def _measured(
     stop = np.flatnonzero(ends) + 1
     start = np.concatenate(([0], stop[:-1]))
     label = flat[start]
+    runs = Runs(start, label, count)
     row, left = np.divmod(start, width)
     right = left + (stop - start)
     pixels = np.bincount(label, stop - start, count)
-    sums = np.bincount(label, np.add.reduceat(depth.ravel(), start), count)
     boxes = np.zeros((count, 4), np.int32)
     first, last = np.full(count, width), np.zeros(count, np.intp)
     np.minimum.at(first, label, left)
@@ -148,7 +175,8 @@ def _measured(
         labels,
         boxes,
         pixels.astype(np.int32),
-        (sums / np.maximum(pixels, 1)).astype(np.float32),
+        (runs.sums(depth) / np.maximum(pixels, 1)).astype(np.float32),
         jump,
         jump_per_metre,
+        runs,
     )
