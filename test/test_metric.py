@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from people_rig import BLACK, CAMERA, COLS, DARK_RED, RED, ROWS, WALL, Someone, images
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
@@ -293,6 +294,23 @@ def test_who_comes_out_from_behind_another_before_a_robot_that_drives_is_not_the
         box = targets.update(sample.frame)[number].box
         wrong += visible is not None and (box is None or box.iou(visible) < 0.5)
     assert wrong < 10, 'half of it without'
+
+
+def test_what_shows_behind_a_target_that_has_gone_is_not_the_target():
+    """At about 1 Hz; he was chosen with the head outside the image, when nothing else was known."""
+    target = Someone(0.0, 1.2, RED, BLACK)
+    behind, depth_behind = images([])
+    for rows, paint in ((slice(50, 100), DARK_RED), (slice(100, ROWS), BLACK)):
+        behind[rows, 30:150], depth_behind[rows, 30:150] = paint, 2.3
+    color, depth = images([target])
+    front = depth < WALL
+    color = np.where(front[..., None], color, behind)
+    depth = np.where(front, depth, depth_behind)
+    tracker = create_tracker('metric')
+    tracker.start(Frame(color, depth, 0, CAMERA), target.box.clipped(COLS, ROWS) or target.box)
+    for second in range(1, 5):
+        track = tracker.update(Frame(behind, depth_behind, second * 10**9, CAMERA))
+        assert track.box is None
 
 
 def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():

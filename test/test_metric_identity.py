@@ -30,7 +30,7 @@ from people_rig import (
 from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
-from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
@@ -111,6 +111,18 @@ def test_the_same_shirt_in_the_shade_is_still_the_same():
     red, shade, other = look(RED), look(DARK_RED), look(BLUE)
     assert alike(red, shade) > alike(red, other) + 0.2
     assert same_person(red, shade) > 0.5
+
+
+@pytest.mark.parametrize('blue', [0.87, 1.1])
+def test_the_same_clothes_in_bluer_light_are_still_the_same(blue: float):
+    clothes = (120, 130, 150)
+    lit = (round(clothes[0] * blue), *clothes[1:])
+    assert color_codes(np.full((1, 1, 3), lit, np.uint8)) != color_codes(
+        np.full((1, 1, 3), clothes, np.uint8)
+    )
+    assert alike(look(clothes, clothes), look(lit, lit)) > 0.95
+    redder = (*clothes[:2], round(clothes[2] * 1.3))
+    assert alike(look(clothes, clothes), look(redder, redder)) < 0.9
 
 
 def test_parts_are_compared_with_the_same_parts():
@@ -513,6 +525,17 @@ def test_who_is_cut_off_at_a_side_is_not_learned_once_he_is_known(views: int, le
     for _ in range(3):
         watched.see(Someone(0.0, 3.0, DARK_RED, GREY), Someone(0.3, 2.4, BLUE))
     assert (len(one.gallery.views) > known) == learned
+
+
+def test_of_what_is_too_small_for_a_figure_no_figure_is_asked():
+    """Of whom little showed at the image's side, all that showed later was refused."""
+    watched = Watched()
+    watched.see(Someone(0.0, 3.0, RED), Someone(1.2, 3.0, BLUE))
+    account = watched.see(Someone(0.0, 3.0, RED), Someone(1.2, 3.0, BLUE))
+    one, seen = who(account, 0), account.sights[1].figure.seen
+    assert account.claim(one, seen).assigned == -1
+    one.area = 0.5 * SMALL
+    assert account.claim(one, seen).assigned == 1
 
 
 def test_what_belongs_to_one_who_was_met_cannot_be_claimed():

@@ -159,6 +159,21 @@ def test_who_comes_farther_off_where_another_has_gone_out_of_sight_is_before_the
     assert room.before[THING].all()
 
 
+@pytest.mark.parametrize('where', ['goes on as the room', 'goes on before it', 'stands alone'])
+def test_what_shows_behind_who_has_gone_is_the_room_where_it_goes_on_as_the_room(where: str):
+    """A second later: who was hidden may have come nearer, or have been behind him all along."""
+    hidden = NOBODY.copy()
+    hidden[:, 70:140] = True
+    behind = wall()
+    behind[40:100, 75 if where == 'stands alone' else 60 : 120] = 2.5
+    first = np.where(hidden, np.float32(1.2), behind if where == 'goes on as the room' else wall())
+    room = Room()
+    room.restart(first, hidden)
+    see(room, behind, 1.0, None)
+    assert room.before[45:95, 80:115].any() == (where != 'goes on as the room')
+    assert not room.before[:35].any(), 'the wall behind is farther than he can have stepped back'
+
+
 def test_pixels_that_turn_out_to_be_somebody_are_taken_out_of_the_room():
     room = known_room(with_thing())
     claimed = NOBODY.copy()

@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.figures import makes_figure
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.pose import Pose
@@ -87,6 +88,8 @@ class MetricTargets:
         if self.account is not None and follower.seen is not None:
             # Whoever stood there from the first frame on was taken for a part of the room.
             self._reader.is_somebody(follower.seen)
+            if follower.person is not None:
+                follower.person.figure |= makes_figure(self.account.scene, follower.seen)
         number = self._name(follower.person)
         self._followers[number] = follower
         return number

@@ -195,7 +195,8 @@ class Account:
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``."""
         # A small thing is no figure, but may be in the hands or at the feet of one.
-        index = self.sight_of(seen) if person.area >= SMALL else -1
+        small = person.area < SMALL
+        index = -1 if small else self.sight_of(seen)
         look = None
         stranger = self.stranger(person, index)
         if stranger is not None:
@@ -207,7 +208,7 @@ class Account:
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
-        assigned = 0 if person.figure else 1
+        assigned = 0 if person.figure and not small else 1
         if index >= 0:
             assigned = 0
             if stranger is not None and self.likest(stranger) is person:

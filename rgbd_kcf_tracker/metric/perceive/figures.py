@@ -266,13 +266,19 @@ def _heads(
 
 def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figure | None:
     seen = Silhouette.of(scene.view, left, top, mask, 0, scene.rim)
+    if not makes_figure(scene, seen):
+        return None
+    highest = None if seen.cut.top else seen.highest(scene.elevation)
+    return Figure(seen, highest, place_of(scene, seen), parted)
+
+
+def makes_figure(scene: Scene, seen: Silhouette) -> bool:
+    """Whether a silhouette that stands before the room is large and high enough for a figure."""
     cut_off = seen.cut.any
     if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
-        return None
+        return False
     highest = seen.highest(scene.elevation)
-    if highest is not None and highest < LEAST_TOP:
-        return None
-    return Figure(seen, None if seen.cut.top else highest, place_of(scene, seen), parted)
+    return highest is None or highest >= LEAST_TOP
 
 
 def place_of(scene: Scene, seen: Silhouette) -> FloatArray:

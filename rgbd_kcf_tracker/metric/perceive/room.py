@@ -41,7 +41,8 @@ AGREEING = 0.5
 """Share of readings where they were from which the camera stands where it stood, and of the room
 that has readings from which a view tells what has none any more."""
 MOST = 0.5
-"""Share of a surface that is room from which all of it is."""
+"""Share of where a part of a surface that was hidden meets what is known, along which it goes on as
+the room, from which that part is room, too."""
 GOES_ON = 0.25
 """Share of a surface that must be known to stand before the room, and no less of it than is room,
 for the rest of it to be somebody too."""
@@ -86,6 +87,30 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
     hole[(0, -1), :] = False
     seen[hole] = beside[hole]
     return seen
+
+
+def _going_on(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -> Mask:
+    """Surfaces, ``(n,)`` bool, that go on as the room where a part of them meets what is known.
+
+    Args:
+        part: ``(h, w)`` bool, the part.
+        known: ``(h, w)`` bool, pixels with a reading where the room is known.
+        nearer: ``(h, w)`` bool, those of them that show something before it.
+        surfaces: of the view.
+    """
+    labels = surfaces.labels
+    meets, goes_on = np.zeros((2, len(surfaces)), np.intp)
+    for axis in (0, 1):
+        first, second = (slice(None),) * axis, (slice(None),) * axis
+        first, second = (*first, slice(None, -1)), (*second, slice(1, None))
+        for here, there in ((first, second), (second, first)):
+            end = part[here] & known[there]
+            same = end & ~nearer[there] & (labels[here] == labels[there])
+            meets += np.bincount(labels[here][end], minlength=len(meets))
+            goes_on += np.bincount(labels[here][same], minlength=len(meets))
+    result: Mask = goes_on > MOST * meets
+    result[0] = False
+    return result
 
 
 class Room:
@@ -200,7 +225,7 @@ class Room:
         new = valid & ~known
         open_ = np.flatnonzero(new & (self._blind >= BLIND_FRAMES))
         if len(open_):
-            np.put(before, open_, self._taken(open_, depth, dt, allowed, same, surfaces))
+            np.put(before, open_, self._taken(open_, depth, dt, allowed, both, before, surfaces))
         self.before, self.still = before, same
         np.copyto(self.depth, depth, where=new & ~before)
         self._blind *= ~both
@@ -230,7 +255,8 @@ class Room:
         depth: DepthArray,
         dt: float,
         allowed: DepthArray,
-        same: Mask,
+        known: Mask,
+        nearer: Mask,
         surfaces: Surfaces,
     ) -> Mask:
         """Which of the places where the room is not known show somebody, ``(n,)`` bool.
@@ -240,7 +266,8 @@ class Room:
             depth: of the view.
             dt: seconds since the last.
             allowed: of the depth, see :func:`tolerance`.
-            same: ``(h, w)`` bool, the pixels that show the room.
+            known: ``(h, w)`` bool, the places where it is known that have a reading.
+            nearer: ``(h, w)`` bool, those of them that show something before the room.
             surfaces: of the view.
         """
         now, front = np.take(depth, open_), np.take(self._front, open_)
@@ -249,10 +276,11 @@ class Room:
         # What is farther than who stood there, and goes on as the room, is the room.
         behind = ~left & (now > front + np.float32(LEAP))
         if behind.any():
-            inside = np.bincount(surfaces.labels[same], minlength=len(surfaces))
-            mostly = inside > MOST * surfaces.pixels
-            mostly[0] = False
-            left |= behind & mostly[np.take(surfaces.labels, open_)]
+            hidden = np.zeros(depth.shape, np.bool_)
+            np.put(hidden, open_[behind], True)
+            left |= (
+                behind & _going_on(hidden, known, nearer, surfaces)[np.take(surfaces.labels, open_)]
+            )
         np.put(self._blind, open_[left], 0)
         # Who passes before somebody does not take his place.
         taken: Mask = ~left
