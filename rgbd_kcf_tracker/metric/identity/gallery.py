@@ -7,8 +7,7 @@ A view is a histogram of colour codes for each slice of the body, counted in met
 top of the head, so that it does not change with distance (colour in height slices is the common
 root of the hand-made descriptors, as of Lisanti et al., "Person re-identification by iterative
 re-weighted sparse ranking", 2015). Views are compared slice by slice by the Bhattacharyya
-coefficient, at the shift of light that fits best: the same shirt is brighter and bluer near the
-window.
+coefficient, at the shift of lightness that fits best: the same shirt is brighter near the window.
 """
 
 from __future__ import annotations
@@ -36,11 +35,9 @@ COLORFUL = 2.0
 wear dark grey, so that it says little of who it is."""
 HEAD_WEIGHT = 0.3
 """Weight of the first slice: hair and skin are much the same on all."""
-DIMMER, BLUER = (0, 1, -1, 2, -2), (0, 1, -1)
-SHIFT_COST = 0.01
-"""Shifts of lightness and of blue against green, in levels, at which two views are compared, and
-what each level costs: where lamp and window meet, light differs in strength and, along the line of
-black bodies, mostly in blue."""
+DIMMER = (0, 1, -1, 2, -2)
+DIMMER_COST = 0.01
+"""Shifts of lightness, in levels, at which two views are compared, and what each level costs."""
 LEAST_SLICE = 0.004
 """Square metres of a slice from which its colours are compared."""
 LEAST_PIXELS = 30
@@ -129,11 +126,6 @@ class View:
         """Square metres that show."""
         return float(self.area.sum())
 
-    @cached_property
-    def bluer(self) -> FloatArray:
-        """Its histograms in bluer and yellower light as well, see :data:`BLUER`."""
-        return _bluer(self.roots)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
@@ -170,46 +162,24 @@ class Looks:
         )
 
 
-def _diagonals() -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Where, in a flattened product of levels by bluer levels, the diagonals lie and begin."""
-    cells = [
-        [(level * len(BLUER) + bluer) * LIGHTNESS + level + shift for level in range(LIGHTNESS)
-         if 0 <= level + shift < LIGHTNESS]
-        for bluer in range(len(BLUER)) for shift in DIMMER
-    ]  # fmt: skip
-    starts = np.cumsum([0] + [len(each) for each in cells[:-1]])
-    return np.concatenate(cells).astype(np.intp), starts.astype(np.intp)
-
-
-_CELLS, _STARTS = _diagonals()
-_COST = (SHIFT_COST * np.add.outer(np.abs(BLUER), np.abs(DIMMER)).ravel()).astype(np.float32)
-
-
-def _bluer(roots: FloatArray) -> FloatArray:
-    """Histograms ``(SLICES, LIGHTNESS, TINTS * TINTS)`` at each shift of blue, one on another."""
-    tints = roots.reshape(SLICES, LIGHTNESS, TINTS, TINTS)
-    shifted = np.zeros((SLICES, len(BLUER), *tints.shape[1:]), np.float32)
-    for index, by in enumerate(BLUER):
-        to, of = slice(max(by, 0), TINTS + min(by, 0)), slice(max(-by, 0), TINTS + min(-by, 0))
-        shifted[:, index, ..., to] = tints[..., of]
-    return shifted.reshape(SLICES, len(BLUER) * LIGHTNESS, TINTS * TINTS)
+_DIAGONALS = np.stack([np.eye(LIGHTNESS, k=k).ravel() for k in DIMMER], axis=1).astype(np.float32)
+"""Sums of a product of levels by levels along the diagonals that are the shifts."""
+_COST = (DIMMER_COST * np.abs(DIMMER)).astype(np.float32)
 
 
 def similarity(view: View, looks: Looks) -> FloatArray:
     """How alike a view is to each of several, ``(n,)``, 0 to 1; 0 where no slice can be compared.
 
     The mean over the slices that show in both, each counting by how much of it shows, how colourful
-    it is and :data:`HEAD_WEIGHT`, at the best of the shifts of light.
+    it is and :data:`HEAD_WEIGHT`, at the best of the shifts of lightness.
     """
     common = np.minimum(looks.area, view.area)
     weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
     weight[common < LEAST_SLICE] = 0
     weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
     # All levels of one against all of the other; the shifts are the diagonals of that.
-    cross = looks.roots @ view.bluer.transpose(0, 2, 1)
-    cells = cross.reshape(SLICES, len(looks), -1)[:, :, _CELLS]
-    alike = np.add.reduceat(cells, _STARTS, axis=2)
-    mean = np.einsum('ns,snd->nd', weight, alike) - _COST
+    cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
+    mean = np.einsum('ns,snd->nd', weight, cross) @ _DIAGONALS - _COST
     best: FloatArray = np.maximum(mean.max(axis=1), 0)
     return best
 

@@ -98,16 +98,23 @@ def _going_on(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -> Mask
         nearer: ``(h, w)`` bool, those of them that show something before it.
         surfaces: of the view.
     """
-    labels = surfaces.labels
+    left, top, width, height = cv2.boundingRect(part.view(np.uint8))
+    about = slice(max(top - 1, 0), top + height + 1), slice(max(left - 1, 0), left + width + 1)
+    part, known, labels = part[about], known[about], surfaces.labels[about]
+    room = known & ~nearer[about]
     meets, goes_on = np.zeros((2, len(surfaces)), np.intp)
-    for axis in (0, 1):
-        first, second = (slice(None),) * axis, (slice(None),) * axis
-        first, second = (*first, slice(None, -1)), (*second, slice(1, None))
-        for here, there in ((first, second), (second, first)):
-            end = part[here] & known[there]
-            same = end & ~nearer[there] & (labels[here] == labels[there])
-            meets += np.bincount(labels[here][end], minlength=len(meets))
-            goes_on += np.bincount(labels[here][same], minlength=len(meets))
+    before, after = np.s_[:-1], np.s_[1:]
+    for here, there in (
+        (np.s_[:, before], np.s_[:, after]),
+        (np.s_[:, after], np.s_[:, before]),
+        (np.s_[before, :], np.s_[after, :]),
+        (np.s_[after, :], np.s_[before, :]),
+    ):
+        ends = np.nonzero(part[here] & known[there])
+        mine = labels[here][ends]
+        same = room[there][ends] & (mine == labels[there][ends])
+        meets += np.bincount(mine, minlength=len(meets))
+        goes_on += np.bincount(mine[same], minlength=len(meets))
     result: Mask = goes_on > MOST * meets
     result[0] = False
     return result
