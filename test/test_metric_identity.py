@@ -515,6 +515,26 @@ def test_who_is_cut_off_at_a_side_is_not_learned_once_he_is_known(views: int, le
     assert (len(one.gallery.views) > known) == learned
 
 
+@pytest.mark.parametrize(
+    ('mine', 'chosen', 'learned'),
+    [(0.3, False, False), (0.7, False, True), (0.7, True, False), (1.7, True, True)],
+)
+def test_of_others_the_likeliest_is_learned_but_not_what_may_be_the_chosen_one(
+    mine: float, chosen: bool, learned: bool
+):
+    watched = Watched()
+    account, (column, _) = watched.beside(RED, BLUE)
+    one, other = who(account, 0), who(account, 1)
+    one, other = (one, other) if column == 0 else (other, one)
+    other.chosen = chosen
+    account.odds[account.people.index(one), column] = mine
+    account.odds[account.people.index(other), column] = 0.5
+    account.sights[column] = dataclasses.replace(account.sights[column], view=look(GREEN, GREY))
+    known = len(one.gallery.views)
+    watched.crowd.learn(account, {})
+    assert (len(one.gallery.views) > known) == learned
+
+
 def test_of_what_is_too_small_for_a_figure_no_figure_is_asked():
     """Of whom little showed at the image's side, all that showed later was refused."""
     watched = Watched()

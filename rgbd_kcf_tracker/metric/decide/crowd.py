@@ -40,7 +40,8 @@ RETURN, GONE = 1.5, 4.0
 """Log-odds against somebody who is away coming back just now rather than somebody new, and the
 seconds after which two thirds of that hold: who was missed for a moment is not away."""
 SURE = 1.0
-"""Log-odds by which an identity must be ahead of all others to be learned from."""
+"""Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
+among these the likeliest is enough, for who is known by few views is hardly recognised."""
 WHOLE = 0.2
 """Square metres of a figure from which its view is learned."""
 HEADED = 1.45
@@ -605,11 +606,15 @@ class Crowd:
         all_sides = len(person.gallery.views) > ALL_SIDES
         if index >= 0 and row < len(account.odds):
             odds, looks = account.odds[:, index].tolist(), account.looks[:, index].tolist()
-            rival = max([0.0, *odds[:row], *odds[row + 1 :]])
+            ahead = SURE if person.chosen else 0.0
+            rivals = [ahead]
+            for other, odds_of_other in zip(account.people, odds, strict=False):
+                if other is not person:
+                    rivals.append(odds_of_other + (SURE if other.chosen else ahead))
             # His place may say that it is he, and his look that it is one who is not in view.
             here = {*account.owner, row}
             liker = max([0.0, *(look for n, look in enumerate(looks) if n not in here)])
-            if odds[row] - rival < SURE or (all_sides and liker - looks[row] > SURE):
+            if odds[row] < max(rivals) or (all_sides and liker - looks[row] > SURE):
                 return
         person.upright = (
             person.upright
