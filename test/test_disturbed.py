@@ -52,8 +52,15 @@ def test_nothing_is_written_over_and_what_is_no_recording_is_said(
     assert disturbed.main([str(recording), '--out', str(out), '--copies', '1']) == 0
     assert disturbed.main([str(recording), '--out', str(out), '--copies', '1']) == 2
     assert '1_room' in capsys.readouterr().err
-    assert disturbed.main([str(tmp_path), '--out', str(out)]) == 2
+    assert disturbed.main([str(recording), '--out', str(recording / 'out')]) == 2
+    assert 'lies inside the source' in capsys.readouterr().err
+    empty = tmp_path / 'empty'
+    empty.mkdir()
+    assert disturbed.main([str(empty), '--out', str(out)]) == 2
     assert 'holds no folders of colour and depth' in capsys.readouterr().err
     (recording / 'rgb' / '1.png').write_bytes(b'no image')
     assert disturbed.main([str(recording), '--out', str(tmp_path / 'other')]) == 2
-    assert '1.png cannot be read' in capsys.readouterr().err
+    assert (
+        '1.png: compressed image of 8 bytes is neither JPEG, PNG nor TIFF'
+        in capsys.readouterr().err
+    )

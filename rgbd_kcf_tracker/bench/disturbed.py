@@ -17,14 +17,16 @@ import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
-from rgbd_kcf_tracker.evaluation.datasets.everyone import IMAGE_FOLDERS
+from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
+from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
+from rgbd_kcf_tracker.recordings.imagefiles import image_files
+from rgbd_kcf_tracker.recordings.outputs import cannot_write, check_outputs, make_folder
 
 STRONGER, TINTED = 0.15, 0.05
 """Deviation of the logarithm of the light, and of that of blue and of red against green."""
@@ -33,58 +35,48 @@ COLOR_NOISE = 3.0
 DEPTH_NOISE = 0.0015
 """Metres at one metre; grows with the square of depth (Khoshelham and Elberink 2012)."""
 
-Image = npt.NDArray[np.uint8] | npt.NDArray[np.uint16]
-
 
 def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
-    """Write a disturbed copy of a folder of images, and return how many pairs it has.
+    """Write a disturbed copy of a recording, and return how many pairs it has.
 
     Args:
-        folder: with a folder of colour images, and ``depth`` of 16 bits in millimetres.
+        folder: with a folder of colour images, and ``depth``.
         out: is made.
         rng: of all that is random.
 
     Raises:
-        RecordingError: where the folder holds no such images or one cannot be read.
-        OSError: where the copy cannot be written.
+        RgbdKcfError: where the folder holds no pairs, one cannot be read, or none can be written.
     """
-    colors = next((folder / name for name in IMAGE_FOLDERS if (folder / name).is_dir()), None)
+    colors = image_folder(folder)
     if colors is None or not (folder / 'depth').is_dir():
         raise RecordingError(f'{folder} holds no folders of colour and depth images')
-    out.mkdir(parents=True)
-    for part in (colors.name, 'depth'):
-        (out / part).mkdir()
+    frames = read_frames(folder, image_files(colors), fps=1.0)
+    if out.exists():
+        raise RecordingError(f'{out} is there already: give another --out')
+    for part in (out, out / colors.name, out / 'depth'):
+        make_folder(part)
     for path in folder.iterdir():
         if path.is_file():
             shutil.copyfile(path, out / path.name)
     green = STRONGER * rng.standard_normal()
     blue, red = green + TINTED * rng.standard_normal(2)
     gain = np.exp([blue, green, red])
-    count = 0
-    for path in sorted(colors.iterdir()):
-        image = _read(path, cv2.IMREAD_COLOR)
-        noisy = image * gain + COLOR_NOISE * rng.standard_normal(image.shape)
-        _write(out / colors.name / f'{path.stem}.png', np.clip(noisy, 0, 255).astype(np.uint8))
-        count += 1
-    for path in sorted((folder / 'depth').iterdir()):
-        depth = _read(path, cv2.IMREAD_UNCHANGED)
-        metres = depth / 1000.0
-        noise = DEPTH_NOISE * np.square(metres) * rng.standard_normal(depth.shape)
-        noisy = np.where(depth > 0, np.rint(1000 * (metres + noise)), 0)
-        _write(out / 'depth' / f'{path.stem}.png', np.clip(noisy, 0, 65535).astype(np.uint16))
-    return count
+    for index, path in enumerate(frames.colors):
+        frame = frames.frame(index)
+        assert frame.depth is not None
+        color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
+        noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
+        depth = np.where(frame.depth > 0, np.rint(1000 * (frame.depth + noise)), 0)
+        _write(out / colors.name / f'{path.stem}.png', np.clip(color, 0, 255).astype(np.uint8))
+        _write(out / 'depth' / f'{path.stem}.png', np.clip(depth, 0, 65535).astype(np.uint16))
+    return len(frames)
 
 
-def _read(path: Path, flags: int) -> Image:
-    image: Any = cv2.imread(str(path), flags)
-    if image is None:
-        raise RecordingError(f'{path} cannot be read as an image')
-    return image  # type: ignore[no-any-return]
-
-
-def _write(path: Path, image: Image) -> None:
-    if not cv2.imwrite(str(path), image):
-        raise OSError(f'{path} cannot be written')
+def _write(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> None:
+    try:
+        path.write_bytes(cv2.imencode('.png', image)[1].tobytes())
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -98,14 +90,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--copies', type=int, default=8, help='of each recording')
     parser.add_argument('--seed', type=int, default=1)
     args = parser.parse_args(argv)
+    names = [folder.resolve().name for folder in args.folders]
+    if args.copies < 1 or args.seed < 0:
+        parser.error('--copies must be 1 or more, and --seed 0 or more')
+    if len(set(names)) < len(names):
+        parser.error(f'two of {", ".join(names)} have the same name: their copies would, too')
     try:
+        check_outputs({'--out': args.out}, args.folders, overwrite=True, folders=('--out',))
+        make_folder(args.out)
         for copy in range(1, args.copies + 1):
-            for index, folder in enumerate(args.folders):
-                out = args.out / f'{copy}_{folder.resolve().name}'
+            for index, (folder, name) in enumerate(zip(args.folders, names, strict=True)):
+                out = args.out / f'{copy}_{name}'
                 rng = np.random.default_rng([args.seed, copy, index])
                 print(f'{out}: {disturb(folder, out, rng)} pairs')
-    except (RgbdKcfError, OSError) as error:
+    except RgbdKcfError as error:
         print(error, file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f'{args.out} cannot be written: {error.strerror or error}', file=sys.stderr)
         return 2
     return 0
 

@@ -48,7 +48,7 @@ People = dict[int, list[Person]]
 
 def is_sequence(path: Path) -> bool:
     """Whether a folder holds images and the truth about several people."""
-    return _image_folder(path) is not None and bool(_truth_files(path))
+    return image_folder(path) is not None and bool(_truth_files(path))
 
 
 def find(path: Path, fps: float) -> list[Sequence]:
@@ -76,7 +76,7 @@ def load(path: Path, fps: float) -> Opened:
         DatasetError: where nobody is in it, or lines and images differ in number.
         RecordingError: for a file that cannot be read, or a line that is not as it should be.
     """
-    folder = _image_folder(path)
+    folder = image_folder(path)
     if folder is None:
         raise DatasetError(f'{path} holds no images in {", ".join(IMAGE_FOLDERS)}')
     images = image_files(folder)
@@ -147,7 +147,8 @@ def _bodies(path: Path, images: tuple[Path, ...], folder: Path) -> list[Box | No
     return boxes
 
 
-def _image_folder(path: Path) -> Path | None:
+def image_folder(path: Path) -> Path | None:
+    """The folder of a recording's colour images, by the first name that is there; None: none is."""
     return next((path / name for name in IMAGE_FOLDERS if (path / name).is_dir()), None)
 
 

@@ -607,14 +607,15 @@ class Crowd:
         if index >= 0 and row < len(account.odds):
             odds, looks = account.odds[:, index].tolist(), account.looks[:, index].tolist()
             ahead = SURE if person.chosen else 0.0
-            rivals = [ahead]
-            for other, odds_of_other in zip(account.people, odds, strict=False):
-                if other is not person:
-                    rivals.append(odds_of_other + (SURE if other.chosen else ahead))
+            rivals = [
+                theirs + (SURE if other.chosen else ahead)
+                for other, theirs in zip(account.people, odds, strict=False)
+                if other is not person
+            ]
             # His place may say that it is he, and his look that it is one who is not in view.
             here = {*account.owner, row}
             liker = max([0.0, *(look for n, look in enumerate(looks) if n not in here)])
-            if odds[row] < max(rivals) or (all_sides and liker - looks[row] > SURE):
+            if odds[row] < max([ahead, *rivals]) or (all_sides and liker - looks[row] > SURE):
                 return
         person.upright = (
             person.upright

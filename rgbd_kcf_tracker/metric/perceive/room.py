@@ -89,8 +89,8 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
     return seen
 
 
-def _going_on(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -> Mask:
-    """Surfaces, ``(n,)`` bool, that go on as the room where a part of them meets what is known.
+def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -> Mask:
+    """Surfaces, ``(n,)`` bool, that are the room where a part of them meets what is known.
 
     Args:
         part: ``(h, w)`` bool, the part.
@@ -285,9 +285,8 @@ class Room:
         if behind.any():
             hidden = np.zeros(depth.shape, np.bool_)
             np.put(hidden, open_[behind], True)
-            left |= (
-                behind & _going_on(hidden, known, nearer, surfaces)[np.take(surfaces.labels, open_)]
-            )
+            room = _continues_room(hidden, known, nearer, surfaces)
+            left |= behind & room[np.take(surfaces.labels, open_)]
         np.put(self._blind, open_[left], 0)
         # Who passes before somebody does not take his place.
         taken: Mask = ~left
