@@ -30,6 +30,7 @@ from people_rig import (
 from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
+from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -247,6 +248,23 @@ def test_the_place_says_less_the_longer_somebody_is_away():
     assert long_after == pytest.approx([0.0, 0.0], abs=0.1)
 
 
+@pytest.mark.parametrize(('behind', 'stays'), [(0.0, True), (-1.0, True), (1.0, False)])
+def test_who_stood_stands_there_still_unless_the_camera_sees_past_his_place(
+    behind: float, stays: bool
+):
+    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    for i in range(1, 5):
+        one.moved_to(np.array([0.0, 3.0]), 0.5 * i)
+    one.last = sight
+    depth = np.full((ROWS, COLS), sight.depth + behind, np.float32)
+    one.missed(depth)
+    one.missed(np.zeros_like(depth))  # no reading there: that shows nothing
+    there, beside = one.place_log_odds(np.array([[0.0, 3.0], [1.0, 3.0]]), 4.0)
+    assert one.hidden == stays
+    assert (there - beside > 0.8) == stays
+
+
 def test_a_thing_that_was_moved_is_nobody_until_it_walks_or_stands_upright():
     thing = Person(1, np.array([0.0, 3.0]), 0.0)
     thing.moved_to(np.array([0.1, 3.0]), 0.1)
@@ -298,6 +316,45 @@ def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     for time in (20.0, 20.5, 21.0):
         one.resembled(7, -2.0, 1.0, time)
     assert one.resemblance(7) == pytest.approx(-2.0, abs=0.01)
+
+
+# -- who comes ------------------------------------------------------------------------------------
+
+
+def test_nobody_known_comes_back_before_anybody_has_come():
+    assert Arrivals().against([]) == pytest.approx(RETURN)
+
+
+def test_the_more_were_new_the_less_likely_somebody_comes_back_and_the_other_way_round():
+    street, home = Arrivals(), Arrivals()
+    for _ in range(20):
+        home.returned(100.0)
+    gone = [0.0, 0.0, 100.0]
+    assert street.against([0.0, 100.0]) < street.against(gone)
+    assert home.against(gone) < RETURN < street.against(gone)
+    assert home.against([100.0]) == 0.0, 'that nobody is new is never taken for granted'
+
+
+def test_each_of_those_who_are_away_is_as_likely_as_the_other():
+    arrivals = Arrivals()
+    one, four = arrivals.against([0.0] * 3 + [1e6]), arrivals.against([1e6] * 4)
+    assert four - one == pytest.approx(np.log(4))
+
+
+def test_who_was_missed_for_a_moment_is_not_away():
+    arrivals = Arrivals()
+    for _ in range(100):
+        arrivals.returned(0.01)
+    assert arrivals.returns < 1
+    assert away(0.0) == 0
+    assert away(GONE) == pytest.approx(2 / 3, abs=0.05)
+
+
+def test_odds_against_it_make_a_probability_less_and_leave_what_is_sure():
+    assert bounded(0.5, np.log(3)) == pytest.approx(0.25)
+    assert bounded(0.9, 0.0) == pytest.approx(0.9)
+    assert bounded(1.0, 5.0) == 1.0
+    assert bounded(0.0, 5.0) == 0.0
 
 
 # -- everyone together ----------------------------------------------------------------------------

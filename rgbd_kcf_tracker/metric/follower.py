@@ -13,6 +13,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
+from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
@@ -208,8 +209,9 @@ class Follower:
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
+                score = bounded(found.probability, account.against * away(surface.hidden_for))
                 surface.miss(account.scene, dt)
-                return self._tracked(frame, box, found.probability, found.seen.depth, belief)
+                return self._tracked(frame, box, score, found.seen.depth, belief)
             surface.resume(found)
         whole = self._whole(account, found.seen)
         if whole is not None:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrivals, away
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -36,9 +37,6 @@ FloatArray = npt.NDArray[np.float64]
 
 NEW = 0.0
 """Log-odds of being somebody known from which a figure is not somebody new."""
-RETURN, GONE = 1.5, 4.0
-"""Log-odds against somebody who is away coming back just now rather than somebody new, and the
-seconds after which two thirds of that hold: who was missed for a moment is not away."""
 SURE = 1.0
 """Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
 among these the likeliest is enough, for who is known by few views is hardly recognised."""
@@ -74,8 +72,8 @@ SAME = 0.8
 MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure."""
 SAME_AGAIN = 0.5
-"""Log-odds beyond :data:`RETURN`, and ahead of anybody else, at which a newcomer is somebody who
-was here before."""
+"""Log-odds beyond those against coming back, and ahead of anybody else, at which a newcomer is
+somebody who was here before."""
 REUNION = 1.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place."""
 RECENT = 0.6
@@ -124,6 +122,7 @@ class Account:
         odds: ``(m, n)`` log-odds of each being each.
         looks: ``(m, n)`` the part of the look and the height in them.
         settled: whether the room has been seen for long enough to tell what stands before it.
+        against: log-odds against any one of those who are away coming back just now.
         owner: for each sight the index among ``people``, or -1.
         verdict: the same as the frame explains itself best, who was chosen and is away included.
     """
@@ -135,6 +134,7 @@ class Account:
     odds: FloatArray
     looks: FloatArray
     settled: bool
+    against: float
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
     _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
@@ -213,7 +213,7 @@ class Account:
         if index >= 0:
             assigned = 0
             if stranger is not None and self.likest(stranger) is person:
-                assigned = int(stranger.resembles(person.number, 0.0) > RETURN + SAME_AGAIN)
+                assigned = 1
             elif self.verdict[index] >= 0:
                 assigned = 1 if self.people[self.verdict[index]] is person else -1
             for row, other in enumerate(self.people[: len(self.odds)]):
@@ -285,9 +285,11 @@ class Account:
         ]
         alike.sort(reverse=True)
         (odds, index), *others = alike or [(0.0, -1)]
-        if odds < RETURN or (others and others[0][0] > odds - SAME_AGAIN):
+        if index < 0 or (others and others[0][0] > odds - SAME_AGAIN):
             return None
-        return self.people[index]
+        person = self.people[index]
+        # Who was chosen is waited for, however many others come.
+        return person if odds >= (RETURN if person.chosen else self.against) else None
 
     def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
@@ -313,6 +315,7 @@ class Crowd:
         self._next = 1
         self._frames = 0
         self._mix_ups = MixUps()
+        self._arrivals = Arrivals()
         self._known: list[Looks] = []
         self._everyone: Looks | None = None
 
@@ -405,18 +408,27 @@ class Crowd:
         self, scene: Scene, sights: list[Sight], time: float
     ) -> tuple[Account, Likeness]:
         """The account of a frame, and the likeness of each sight to each known view, ``(v, n)``."""
-        odds, looks, alike = self._odds(sights, time)
-        settled = self._frames > SETTLED
-        account = Account(scene, time, sights, list(self.people), odds, looks, settled)
+        against = self._arrivals.against(time - p.seen_at for p in self.people if p.alive)
+        odds, looks, alike = self._odds(sights, time, against)
+        account = Account(
+            scene,
+            time,
+            sights,
+            list(self.people),
+            odds,
+            looks,
+            self._frames > SETTLED,
+            against,
+        )
         account.verdict = _assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
         # borne out over some sightings who he is.
-        away = [p.chosen and time - p.seen_at > REUNION for p in self.people]
+        missed = [p.chosen and time - p.seen_at > REUNION for p in self.people]
         account.owner = list(account.verdict)
-        if any(away):
-            odds_of_here = np.where(np.array(away)[:, None], NEW - 1, odds)
+        if any(missed):
+            odds_of_here = np.where(np.array(missed)[:, None], NEW - 1, odds)
             for column, row in enumerate(account.verdict):
-                if row >= 0 and away[row]:
+                if row >= 0 and missed[row]:
                     # Nor is that sight anybody's who was seen beside him.
                     met = [person.number in self.people[row].met for person in self.people]
                     odds_of_here[met, column] = NEW - 1
@@ -446,14 +458,16 @@ class Crowd:
             if other == row or person.number in newcomer.met:
                 continue
             if person.chosen:
-                away = account.time - person.seen_at > REUNION
+                missed = account.time - person.seen_at > REUNION
             else:
-                away = person.seen_at < newcomer.first_seen
-            if away:
+                missed = person.seen_at < newcomer.first_seen
+            if missed:
                 look = float(account.looks[other, column])
                 newcomer.resembled(person.number, look, shows, account.time)
 
-    def _odds(self, sights: list[Sight], time: float) -> tuple[FloatArray, FloatArray, Likeness]:
+    def _odds(
+        self, sights: list[Sight], time: float, against: float
+    ) -> tuple[FloatArray, FloatArray, Likeness]:
         odds = np.zeros((len(self.people), len(sights)))
         looks = np.zeros_like(odds)
         alike = np.zeros((0, len(sights)), np.float32)
@@ -475,7 +489,7 @@ class Crowd:
                 looks[row, column] = person.gallery.log_odds(sight.view, most)
             odds[row] = person.place_log_odds(places, time)
             if not person.chosen:
-                odds[row] -= RETURN * (1 - float(np.exp((person.seen_at - time) / GONE)))
+                odds[row] -= against * away(time - person.seen_at)
         odds += looks
         return odds, looks, alike
 
@@ -539,6 +553,9 @@ class Crowd:
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
+        for person in people:
+            if person.seen_at < time:
+                person.missed(account.scene.view.depth)
         self._introduce(account, {n: None if n in unsure else s for n, s in targets.items()})
         self._reunite(account)
 
@@ -551,8 +568,9 @@ class Crowd:
             person = account.likest(newcomer, ENOUGH)
             if person is None or person.chosen:  # he is recognised by who follows him
                 continue
-            if newcomer.resembles(person.number) < RETURN + SAME_AGAIN:
+            if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
+            self._arrivals.returned(newcomer.first_seen - person.seen_at)
             person.become(newcomer)
             account.owner[column] = account.people.index(person)
             if newcomer in self.people:
@@ -592,7 +610,10 @@ class Crowd:
         """Take one sighting of one person."""
         person, scene = account.people[row], account.scene
         place = account.place(seen)
-        if account.time > person.seen_at:
+        gone = account.time - person.seen_at
+        if gone > REUNION:
+            self._arrivals.returned(gone)
+        if gone > 0:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0
         if not sure or (scene.since is None and person.gallery.views):

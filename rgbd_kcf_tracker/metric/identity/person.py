@@ -14,6 +14,7 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
+DepthArray = npt.NDArray[np.float32]
 
 PLACE_SIGMA = 0.18
 """Metres by which the middle of a silhouette differs from the person's place."""
@@ -39,6 +40,9 @@ FORGET = 3.0
 """Seconds after which two thirds of where somebody was is forgotten."""
 TRAVELLED = 0.5
 """Metres that a thing which was moved, or the noise of one, does not travel."""
+BEYOND, EMPTY = 0.3, 0.5
+"""Metres behind the last sight of somebody at which the camera sees past its place, and the share
+of its outline where it does so if it has gone."""
 ELSEWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden)."""
 
@@ -59,6 +63,7 @@ class Person:
         area: square metres, the most that was seen of it.
         entered: whether it was first seen at the edge of what the camera sees.
         last: the silhouette of the last sight, None where the camera has moved since.
+        hidden: whether it may still stand there, as nothing beyond that place has shown since.
         upright: whether it ever had the shape of a person.
         figure: whether it was a figure when it was last seen, and not a thing too small for one.
         met: numbers of those who were seen at the same time, or too far off for him to have walked
@@ -73,6 +78,7 @@ class Person:
         self.seen_at = self.first_seen = time
         self.sightings = 1
         self.upright = self.mobile = self.entered = self.figure = False
+        self.hidden = True
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.area = 0.0
@@ -96,11 +102,37 @@ class Person:
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ELSEWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
-        density = _density(away, variance)
-        if gone < COAST and self.sightings > 2 and np.hypot(*self.velocity) < SLOW:
-            density += STANDS * (_density(away, PLACE_SIGMA**2 + (SWAYING * gone) ** 2) - density)
-        odds: FloatArray = np.log((1 - anywhere) * density * ROOM_AREA + anywhere)
+        walks = (1 - anywhere) * _density(away, variance) * ROOM_AREA + anywhere
+        stands = self._stands(gone)
+        if stands == 0:
+            odds: FloatArray = np.log(walks)
+            return odds
+        still = np.square(places - self.place).sum(axis=1)
+        swayed = PLACE_SIGMA**2 + (SWAYING * min(gone, COAST)) ** 2
+        odds = np.log(stands * _density(still, swayed) * ROOM_AREA + (1 - stands) * walks)
         return odds
+
+    def _stands(self, gone: float) -> float:
+        """Probability that it still stands where it was seen ``gone`` seconds ago."""
+        if self.sightings <= 2 or np.hypot(*self.velocity) > SLOW:
+            return 0.0
+        if gone < COAST:
+            return STANDS
+        # What hides somebody mostly passes; who has left shows by his empty place.
+        return STANDS * float(np.exp(-gone / FORGET)) if self.hidden else 0.0
+
+    def missed(self, depth: DepthArray) -> None:
+        """Take a frame in which it was not found.
+
+        Args:
+            depth: ``(h, w)`` metres, 0 where there is no reading.
+        """
+        if self.last is None or not self.hidden:
+            self.hidden = False
+            return
+        there = depth[self.last.rows, self.last.cols][self.last.mask]
+        past = int(np.count_nonzero(there > self.last.depth + BEYOND))
+        self.hidden = past < EMPTY * len(there)
 
     def out_of_reach(self, place: FloatArray, time: float) -> bool:
         """Whether it cannot have got to ``place``, ``(2,)`` metres, since it was last seen."""
@@ -131,6 +163,7 @@ class Person:
         """Go on as somebody who has turned out to be the same."""
         self.place, self.velocity = newcomer.place, newcomer.velocity
         self.seen_at, self.last = newcomer.seen_at, newcomer.last
+        self.hidden = newcomer.hidden
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright
@@ -150,6 +183,7 @@ class Person:
         self.velocity, other.velocity = other.velocity, self.velocity
         self.seen_at, other.seen_at = other.seen_at, self.seen_at
         self.last, other.last = other.last, self.last
+        self.hidden, other.hidden = other.hidden, self.hidden
         self.figure, other.figure = other.figure, self.figure
         mine, his = self.gallery.taken_back(since), other.gallery.taken_back(since)
         self.gallery.take(his)
@@ -181,7 +215,7 @@ class Person:
         elif gone > 0:
             self.velocity = np.zeros(2)
         self.place = place.copy()
-        self.seen_at = time
+        self.seen_at, self.hidden = time, True
         self.sightings += 1
         self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
 
