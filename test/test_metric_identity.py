@@ -798,6 +798,18 @@ def test_a_target_of_whom_depth_has_few_readings_is_followed_by_them():
             assert track.depth == pytest.approx(one.z, abs=0.05)
 
 
+def test_what_shows_behind_a_target_that_touches_a_door_frame_is_not_the_target():
+    one = Someone(0.0, 3.0)
+    color, depth = images([one])
+    x0, x1 = round(one.box.x), round(one.box.right)
+    depth[:, :x0] = depth[:, x1:] = one.z + 0.05  # all but the door
+    account = Watched().crowd.explain(
+        SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1), 0.0
+    )
+    seen = BySurface.surface_of(account, one.box)
+    assert seen is None or seen.depth == pytest.approx(one.z, abs=0.1)
+
+
 @pytest.mark.parametrize('own', [False, True])
 def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colours(
     own: bool, monkeypatch: pytest.MonkeyPatch

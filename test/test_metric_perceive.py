@@ -174,6 +174,18 @@ def test_what_shows_behind_who_has_gone_is_the_room_where_it_goes_on_as_the_room
     assert not room.before[:35].any(), 'the wall behind is farther than he can have stepped back'
 
 
+def test_who_steps_back_to_a_far_wall_does_not_become_the_wall():
+    first = wall(4.45)
+    first[THING] = 4.0
+    room = Room()
+    room.restart(first, first == 4.0)
+    for z in (4.3, 4.35):
+        stepped = wall(4.45)
+        stepped[THING] = z
+        see(room, stepped, 0.2, None)
+        assert room.before[THING].all()
+
+
 def test_pixels_that_turn_out_to_be_somebody_are_taken_out_of_the_room():
     room = known_room(with_thing())
     claimed = NOBODY.copy()

@@ -203,6 +203,10 @@ class BySurface:
         mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
         if np.count_nonzero(mine) < SCATTERED * mine.size:
             return None
+        # What shows past something nearer that fills more of the box is behind the target.
+        nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)
+        if np.count_nonzero(nearer) > np.count_nonzero(mine):
+            return None
         seen = Silhouette.trimmed(scene.view, x0, y0, mine, scene.rim)
         if seen is None:
             return None

@@ -49,6 +49,9 @@ for the rest of it to be somebody too."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
+BEHIND = 0.4
+"""Metres behind a person from which what shows in his place, and goes on as the room, is the room:
+he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
 
 
 def tolerance(depth: DepthArray) -> DepthArray:
@@ -281,7 +284,7 @@ class Room:
         leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + np.take(allowed, open_)
         left = (front > 0) & (now > front + leap)
         # What is farther than who stood there, and goes on as the room, is the room.
-        behind = ~left & (now > front + np.float32(LEAP))
+        behind = ~left & (now > front + np.float32(BEHIND))
         if behind.any():
             hidden = np.zeros(depth.shape, np.bool_)
             np.put(hidden, open_[behind], True)
