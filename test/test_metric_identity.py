@@ -333,6 +333,8 @@ def test_the_more_were_new_the_less_likely_somebody_comes_back_and_the_other_way
     assert street.against([0.0, 100.0]) < street.against(gone)
     assert home.against(gone) < RETURN < street.against(gone)
     assert home.against([100.0]) == 0.0, 'that nobody is new is never taken for granted'
+    street.forgotten = 100
+    assert street.against(gone) > RETURN + 2
 
 
 def test_each_of_those_who_are_away_is_as_likely_as_the_other():

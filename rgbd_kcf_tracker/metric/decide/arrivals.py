@@ -33,9 +33,11 @@ class Arrivals:
 
     Attributes:
         returns: how often somebody did, each as surely as he had been away.
+        forgotten: people who came and are not remembered any more.
     """
 
     returns: float = 0.0
+    forgotten: int = 0
 
     def returned(self, gone: float) -> None:
         """Take somebody who came back after ``gone`` seconds."""
@@ -51,6 +53,6 @@ class Arrivals:
             gone: for all who are known the seconds since they were last seen.
         """
         shares = [away(each) for each in gone]
-        new = len(shares) + KNOWN * math.exp(RETURN)
+        new = len(shares) + self.forgotten + KNOWN * math.exp(RETURN)
         any_of = max(1.0, sum(shares))
         return max(0.0, math.log(any_of * new / (self.returns + KNOWN)))

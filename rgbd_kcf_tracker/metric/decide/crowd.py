@@ -323,7 +323,9 @@ class Crowd:
         """Somebody new at ``place``, ``(2,)`` metres."""
         others = [p for p in self.people if not p.chosen]
         if len(others) >= MOST_PEOPLE:
-            self.people.remove(min(others, key=lambda p: (p.alive, p.seen_at)))
+            forgotten = min(others, key=lambda p: (p.alive, p.seen_at))
+            self._arrivals.forgotten += forgotten.alive
+            self.people.remove(forgotten)
         person = Person(self._next, place, time, chosen)
         self._next += 1
         self.people.append(person)
