@@ -805,11 +805,20 @@ def test_what_shows_behind_a_target_that_touches_a_door_frame_is_not_the_target(
     color, depth = images([one])
     x0, x1 = round(one.box.x), round(one.box.right)
     depth[:, :x0] = depth[:, x1:] = one.z + 0.05  # all but the door
-    account = Watched().crowd.explain(
-        SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1), 0.0
-    )
-    seen = BySurface.surface_of(account, one.box)
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = BySurface.surface_of(Crowd().explain(scene, 0.0), one.box)
     assert seen is None or seen.depth == pytest.approx(one.z, abs=0.1)
+
+
+def test_a_target_that_shows_in_a_gap_between_two_who_are_nearer_is_not_they():
+    color, depth = images([Someone(0.0, 3.5), Someone(-0.37, 2.0), Someone(0.37, 2.0)])
+    box = Box(100, 45, 40, 70)
+    strip = depth[45:115, 106:134]
+    strip[(strip > 3.5) | (np.random.default_rng(1).random(strip.shape) > 0.3)] = np.nan
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = BySurface.surface_of(Crowd().explain(scene, 0.0), box)
+    assert seen is not None
+    assert seen.depth == pytest.approx(3.5, abs=0.1)
 
 
 @pytest.mark.parametrize('own', [False, True])

@@ -203,9 +203,11 @@ class BySurface:
         mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
         if np.count_nonzero(mine) < SCATTERED * mine.size:
             return None
-        # What shows past something nearer that fills more of the box is behind the target.
+        # Where the middle of the box shows something nearer, they are of what is behind the target.
         nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)
-        if np.count_nonzero(nearer) > np.count_nonzero(mine):
+        down, across = mine.shape[0] // 4, mine.shape[1] // 4
+        middle = np.s_[down : mine.shape[0] - down, across : mine.shape[1] - across]
+        if np.count_nonzero(nearer[middle]) > np.count_nonzero(mine[middle]):
             return None
         seen = Silhouette.trimmed(scene.view, x0, y0, mine, scene.rim)
         if seen is None:
