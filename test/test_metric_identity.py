@@ -49,7 +49,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, palette
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
@@ -72,7 +72,7 @@ def look(
     crop = mask[y[0] : bottom, x[0] : x[-1] + 1]
     view = DepthView(depth, 1, CAMERA)
     seen = Silhouette.of(view, int(x[0]), int(y[0]), crop, 1, Rim())
-    return View.of(view, color_codes(color), seen, top)
+    return View.of(view, ColorCodes(color), seen, top)
 
 
 def alike(first: View, second: View) -> float:

@@ -32,7 +32,13 @@ from rgbd_kcf_tracker.metric.perceive.color_bands import (
     band_histograms,
     band_similarity,
 )
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, color_codes, view_image
+from rgbd_kcf_tracker.metric.perceive.colors import (
+    CODES,
+    TINTS,
+    ColorCodes,
+    color_codes,
+    view_image,
+)
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -215,18 +221,27 @@ def test_band_similarity_is_one_for_itself_and_zero_for_other_colours():
     assert band_similarity(lower, model) == pytest.approx(1.0, abs=1e-5)
 
 
+def test_colour_codes_of_a_part_are_those_of_the_whole():
+    image = np.random.default_rng(3).integers(0, 256, (160, 240, 3), dtype=np.uint8)
+    codes, part = ColorCodes(image), (slice(20, 90), slice(100, 141))
+    np.testing.assert_array_equal(codes[part], color_codes(image)[part])
+    assert codes[part] is codes[part]
+
+
 def test_colours_compare_before_and_after_a_change_of_light():
     rng = np.random.default_rng(0)
     depth = wall()
     dark = cv2.GaussianBlur(rng.integers(0, 140, (160, 240, 3), dtype=np.uint8), (0, 0), 5)
     reader = SceneReader(240, 0.04, 0.03, 0.0, 0)
-    before = reader.read(Frame(dark, depth, 0, CAMERA), 0.0).codes
+    whole = slice(0, 160), slice(0, 240)
+    before = reader.read(Frame(dark, depth, 0, CAMERA), 0.0).codes[whole]
     # Every pixel 1.5 times as bright, from one frame to the next.
     light = np.clip(dark * 1.5, 0, 255).astype(np.uint8)
-    after = reader.read(Frame(light, depth, 1, CAMERA), 0.033).codes
+    after = reader.read(Frame(light, depth, 1, CAMERA), 0.033).codes[whole]
     lightness = TINTS * TINTS
     assert np.mean(after // lightness == before // lightness) > 0.8
-    still = SceneReader(240, 0.04, 0.03, 0.0, 0).read(Frame(light, depth, 1, CAMERA), 0.0).codes
+    other = SceneReader(240, 0.04, 0.03, 0.0, 0)
+    still = other.read(Frame(light, depth, 1, CAMERA), 0.0).codes[whole]
     assert np.mean(still // lightness == before // lightness) < 0.5
 
 
@@ -297,7 +312,7 @@ def test_particles_spread_with_time_not_with_frames():
 def placed(cut_bottom: bool) -> tuple[Body, np.ndarray]:
     depth = wall()
     depth[40:120, 100:130] = 2.0
-    codes = np.zeros((160, 240), np.int32)
+    codes = ColorCodes(np.zeros((160, 240, 3), np.uint8))
     view = view_of(depth)
     body = Body(Silhouette.of(view, 100, 40, depth[40:120, 100:130] == 2.0, 1, Rim()))
     bottom = 120

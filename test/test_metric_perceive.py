@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -402,28 +404,36 @@ def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
 
 
 @pytest.mark.parametrize(
-    ('rate', 'wanted'),
+    ('rate', 'room', 'looks'),
     [
-        (30, [0.1, None, 2 / 30, None, 2 / 30]),
-        (60, [0.1, None, None, 3 / 60, None, None, 3 / 60]),
-        (15, [0.1, 1 / 15, 1 / 15]),
-        (10, [0.1, 0.1, 0.1]),
-        (5, [0.2, 0.2]),
+        (60, [6, 12], [7, 13]),
+        (30, [3, 6, 9], [4, 7, 10]),
+        (15, [2, 4, 6], [2, 4, 6]),
+        (10, [1, 2, 3, 4], [1, 2, 3, 4]),
+        (5, [1, 2], [1, 2]),
     ],
 )
-def test_what_lasts_is_learned_some_twenty_times_a_second_at_the_most(
-    rate: int, wanted: list[float | None]
+def test_what_lasts_is_learned_ten_times_a_second_at_the_most(
+    rate: int, room: list[int], looks: list[int], monkeypatch: pytest.MonkeyPatch
 ):
     reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
-    since = []
-    for i in range(len(wanted)):
+    learned, since = [], {}
+    update = reader.room.update
+
+    def noticed(depth: Any, dt: float, somebody: Any, surfaces: Any, learns: bool) -> None:
+        learned.append(learns)
+        update(depth, dt, somebody, surfaces, learns)
+
+    monkeypatch.setattr(reader.room, 'update', noticed)
+    for i in range(max(looks) + 1):
         scene = reader.read(picture([], i / rate), 1 / rate if i else 0.0)
         assert scene is not None
-        since.append(scene.since)
-    assert [s is None for s in since] == [w is None for w in wanted]
-    assert [s for s in since[1:] if s is not None] == pytest.approx(
-        [w for w in wanted[1:] if w is not None]
-    )
+        if scene.since is not None:
+            since[i] = scene.since
+    assert [i for i, learns in enumerate(learned, 1) if learns] == room
+    assert since.pop(0) > 0, 'the first frame teaches'
+    assert list(since) == looks
+    assert list(since.values()) == pytest.approx(np.diff([0, *looks]) / rate)
 
 
 def test_a_camera_that_moves_learns_from_every_frame():

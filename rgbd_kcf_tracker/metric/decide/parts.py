@@ -15,7 +15,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
-Kinds = npt.NDArray[np.intp]
+Kinds = npt.NDArray[np.uint16]
 
 NOTHING, ROOM, FIRST = 0, 1, 2
 """Kinds of pixels: of nothing known, of the room, of the first of the figures and so on."""
@@ -36,7 +36,7 @@ class Parts:
 
     def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
         self.surfaces = scene.surfaces
-        self.kinds: Kinds = scene.still.astype(np.intp)
+        self.kinds: Kinds = scene.still.astype(np.uint16)
         self.length = FIRST + len(figures)
         for kind, seen in enumerate(figures, FIRST):
             self.kinds[seen.rows, seen.cols][seen.mask] = kind

@@ -75,13 +75,11 @@ def _beyond_rim(scene: Scene, body: Body, seen: Silhouette, top: float, way: int
     limit = int(most * scene.view.intrinsics.fx / seen.depth) - cols + 2
     if limit <= 0:
         return 0
-    codes = scene.codes[seen.rows]
-    if way > 0:
-        codes = codes[:, seen.left + cols : seen.left + cols + limit]
-    else:
-        codes = codes[:, max(0, seen.left - limit) : seen.left][:, ::-1]
-    if codes.shape[1] == 0:
+    first = seen.left + cols if way > 0 else max(0, seen.left - limit)
+    last = min(first + limit, scene.view.shape[1]) if way > 0 else seen.left
+    if first >= last:
         return 0
+    codes = scene.codes[seen.rows, first:last][:, ::way]
     odds = body.odds_of(codes, seen, scene.view, top)
     like = np.convolve((odds > 0).mean(axis=0), np.ones(3) / 3, 'same')
     ends = np.flatnonzero(like < LIKE)

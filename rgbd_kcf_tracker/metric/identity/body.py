@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.metric.perceive.color_bands import (
     band_similarity,
     bands_of_rows,
 )
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, smoothed
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
@@ -93,7 +93,7 @@ class Body:
     def place(
         self,
         seen: Silhouette,
-        codes: Codes,
+        codes: ColorCodes,
         view: DepthView,
         expected: FloatArray,
         expected_sigma: FloatArray | None,
@@ -102,7 +102,7 @@ class Body:
 
         Args:
             seen: the silhouette.
-            codes: ``(h, w)`` colour codes of the view.
+            codes: of the view's colours.
             view: the depth.
             expected: ``(3,)`` metres, where the body's reference point is expected.
             expected_sigma: ``(3,)`` metres, or None where nothing better than ``seen`` is known.
@@ -157,7 +157,7 @@ class Body:
         return row, self.height * k.fy / seen.depth
 
     def _histograms(
-        self, seen: Silhouette, codes: Codes, view: DepthView, top: float
+        self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float
     ) -> npt.NDArray[np.float32]:
         row, rows = self._rows(seen, view, top)
         return band_histograms(codes[seen.rows, seen.cols], seen.mask, row, rows)
@@ -212,13 +212,13 @@ class Body:
         self._usual_area *= max(1.0, factor)
 
     def learn_colors(
-        self, seen: Silhouette, codes: Codes, view: DepthView, top: float, dt: float | None
+        self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float, dt: float | None
     ) -> None:
         """Follow the colours of a silhouette; ``dt`` seconds since the last time, None at first.
 
         Args:
             seen: the silhouette.
-            codes: ``(h, w)`` colour codes of the view.
+            codes: of the view's colours.
             view: the depth.
             top: metres, of the body's upper edge.
             dt: seconds.

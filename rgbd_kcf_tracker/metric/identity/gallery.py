@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, smoothed
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
@@ -85,14 +85,12 @@ class View:
     top: float | None
 
     @classmethod
-    def of(
-        cls, view: DepthView, codes: npt.NDArray[np.int32], seen: Silhouette, top: float | None
-    ) -> View:
+    def of(cls, view: DepthView, codes: ColorCodes, seen: Silhouette, top: float | None) -> View:
         """The look of a silhouette.
 
         Args:
             view: the depth that the silhouette is of.
-            codes: ``(h, w)`` colour codes of the view.
+            codes: of the view's colours.
             seen: the silhouette.
             top: metres above the floor of its top, or None.
         """

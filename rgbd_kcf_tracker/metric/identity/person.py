@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
-DepthArray = npt.NDArray[np.float32]
 
 PLACE_SIGMA = 0.18
 """Metres by which the middle of a silhouette differs from the person's place."""
@@ -98,11 +98,11 @@ class Person:
     def place_log_odds(self, places: FloatArray, time: float) -> FloatArray:
         """Log-odds, ``(n,)``, of being at ``places`` ``(n, 2)`` rather than anybody else."""
         gone = time - self.seen_at
-        away = np.square(places - self.expected(time)).sum(axis=1)
+        off = np.square(places - self.expected(time)).sum(axis=1)
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ELSEWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
-        walks = (1 - anywhere) * _density(away, variance) * ROOM_AREA + anywhere
+        walks = (1 - anywhere) * _density(off, variance) * ROOM_AREA + anywhere
         stands = self._stands(gone)
         if stands == 0:
             odds: FloatArray = np.log(walks)
@@ -136,8 +136,8 @@ class Person:
 
     def out_of_reach(self, place: FloatArray, time: float) -> bool:
         """Whether it cannot have got to ``place``, ``(2,)`` metres, since it was last seen."""
-        away = float(np.hypot(*(place - self.place)))
-        return away > MISPLACED + FASTEST * (time - self.seen_at)
+        distance = float(np.hypot(*(place - self.place)))
+        return distance > MISPLACED + FASTEST * (time - self.seen_at)
 
     def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
         """Take log-odds of a sighting of this one to look like another, who is not in view.

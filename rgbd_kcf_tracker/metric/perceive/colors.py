@@ -85,6 +85,29 @@ def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
     return codes
 
 
+class ColorCodes:
+    """The colour codes of a view's image, made where they are looked at.
+
+    Only those of people and of what stands beside them ever are: a small part of most views.
+
+    Args:
+        image: ``(h, w, 3)`` uint8 BGR.
+    """
+
+    def __init__(self, image: npt.NDArray[np.uint8]) -> None:
+        self._image = image
+        self._made: dict[tuple[int, int, int, int], npt.NDArray[np.int32]] = {}
+
+    def __getitem__(self, part: tuple[slice, slice]) -> npt.NDArray[np.int32]:
+        """Those of some rows and columns, ``(h, w)``; the same array for whoever asks."""
+        rows, cols = part
+        key = rows.start, rows.stop, cols.start, cols.stop
+        codes = self._made.get(key)
+        if codes is None:
+            codes = self._made[key] = color_codes(self._image[part])
+        return codes
+
+
 def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
     """Each code's count shared with its neighbours: 1/4, 1/2, 1/4 along each of the three axes.
 

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 
+DepthArray = npt.NDArray[np.float32]
+
 
 def part_of(
     shape: tuple[int, ...], left: float, top: float, right: float, bottom: float
@@ -36,7 +38,7 @@ class DepthView:
         intrinsics: of the view, that is the colour image's divided by ``step``.
     """
 
-    depth: npt.NDArray[np.float32]
+    depth: DepthArray
     step: int
     intrinsics: Intrinsics
 

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
 
-DepthArray = npt.NDArray[np.float32]
 Mask = npt.NDArray[np.bool_]
 
 NOISE = 0.08

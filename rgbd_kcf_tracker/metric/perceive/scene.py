@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.metric.perceive.colors import color_codes, view_image
+from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
@@ -26,9 +26,9 @@ from rgbd_kcf_tracker.pose import Pose
 
 STILL, STILL_TURN = 0.003, 0.001
 """Metres and radians, a fifth of a pixel of the view, up to which a camera with poses stands."""
-LEARNING_STEP = 0.045
+LEARNING_STEP = 0.09
 """Seconds after which what lasts (room, floor, looks, colours) is learned again while the
-camera stands: at 30 Hz from every second frame, and at 15 Hz and less from each."""
+camera stands: at 30 Hz from every third frame, and at 10 Hz and less from each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +47,12 @@ class Scene:
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
-        codes: ``(h, w)`` int32, its colour codes.
+        codes: of its colours.
         motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
             where it has moved and nothing tells how.
-        since: seconds since the last one from which what lasts was learned; None where nothing is
-            to be learned from this one but where everybody is, see :data:`LEARNING_STEP`.
+        since: seconds since the last one from which looks and sizes were learned; None where
+            nothing is to be learned from this one but where everybody is, see
+            :data:`LEARNING_STEP`.
     """
 
     view: DepthView
@@ -64,7 +65,7 @@ class Scene:
     surfaces: Surfaces
     rim: Rim
     image: npt.NDArray[np.uint8]
-    codes: npt.NDArray[np.int32]
+    codes: ColorCodes
     motion: Pose | Lost | None
     since: float | None
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
@@ -123,7 +124,7 @@ class SceneReader:
         self._light = Light()
         self._ego = EgoMotion()
         self._pose: Pose | None = None
-        self._since = LEARNING_STEP
+        self._learned = self._taught = LEARNING_STEP
         self.seems: Pose | None = None
         self.room = Room()
         self.somebody: npt.NDArray[np.bool_] | None = None
@@ -133,14 +134,19 @@ class SceneReader:
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
         self.seems = None
-        self._since += seconds
+        self._learned += seconds
+        self._taught += seconds
         view = DepthView.of(frame, self._width)
         if view is None:
             return None
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
-        learns = self.stood_for == 0.0 or self._since >= LEARNING_STEP
+        moves = self.stood_for == 0.0
+        learns = moves or self._learned >= LEARNING_STEP
+        # Where frames come fast, looks are learned from another one than the room: none takes long.
+        apart = learns and 0 < seconds < LEARNING_STEP / 2
+        teaches = moves or (self._taught >= LEARNING_STEP and not apart)
         floor = self._floors.update(view, learns) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
         forward = view.depth
@@ -174,9 +180,11 @@ class SceneReader:
             self.room.update(view.depth, seconds, somebody, surfaces, learns)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
-        since = self._since if learns else None
+        since = self._taught if teaches else None
         if learns:
-            self._since = 0.0
+            self._learned = 0.0
+        if teaches:
+            self._taught = 0.0
         return Scene(
             view,
             floor,
@@ -188,7 +196,7 @@ class SceneReader:
             surfaces,
             self._rim,
             image,
-            color_codes(image),
+            ColorCodes(image),
             motion,
             since,
         )
