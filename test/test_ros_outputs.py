@@ -162,9 +162,11 @@ def test_evidence_is_computed_while_somebody_subscribes_and_never_else(
         told = [evidence_of(message)[1] for message in heard]
         rig.node.destroy_subscription(subscription)
         rig.wait(lambda: not node._outputs.wanted('evidence'))
-        rig.wait(lambda: len(asked) == 26, timeout=10)
+        # Of the frame before, evidence may have been due when the subscription came.
+        before = len(asked)
+        assert before in (26, 27)
         rig.play(range(30, 34))
-        assert len(asked) == 26
+        assert len(asked) == before
     assert all(each.asked_for for each in told)
     seen, hidden = told[2].insight, told[-1].insight
     if variant == 'metric':

@@ -442,9 +442,14 @@ class Player:
         self._again(self._shown)
 
     def _again(self, number: int) -> None:
-        """Trackers that stand at a frame: each starts where its target was last seen up to it."""
+        """Trackers that stand at a frame: each starts where its target was last seen up to it.
+
+        Where frames before that are gone through for everyone, it starts as long before: who is
+        chosen at a moment at which he stands before another may be taken for both.
+        """
         keys = self._passed[number].chosen if number in self._passed else ()
         starts: dict[int, int] = {}
+        warm = max(0, number - WARM_UP) if self._everyone else number
         for key in keys:
             for earlier in range(number, -1, -1):
                 passed = self._passed.get(earlier)
@@ -452,13 +457,12 @@ class Player:
                     break
                 if passed.tracks[key].box is not None:
                     starts[key] = earlier
+                if key in starts and earlier <= warm:
                     break
         self._targets = Targets(self._variant, self._parameters, self._everyone, self._numbers)
         self._forget_after(number)
         self._known.clear()
-        begin = min(starts.values(), default=number)
-        if self._everyone:
-            begin = max(0, min(begin, number - WARM_UP))
+        begin = min([warm, *starts.values()])
         tracks: dict[int, Track] = {}
         for at in range(begin, number + 1) if starts or self._everyone else ():
             frame = self._read(at)
