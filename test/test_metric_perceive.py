@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from people_rig import BLUE, CAMERA, COLS, ROWS, WALL, Someone, images, picture, texture
+from people_rig import BLUE, CAMERA, COLS, ROWS, TOP, WALL, Someone, images, picture, texture
 
 from rgbd_kcf_tracker import Box, Frame
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -483,6 +483,45 @@ def test_head_and_shoulders_are_a_person_and_a_box_is_not():
     seen = Someone(0.0, 3.0).box
     box[int(seen.y) : int(seen.bottom), int(seen.x) : int(seen.right)] = 3.0
     assert not upright(silhouette(box), CAMERA, 1.6)
+
+
+@pytest.mark.parametrize(
+    ('rows', 'person'),
+    [
+        (((0.2, 0.19), (0.28, 0.1), (0.9, 0.25), (1.6, 0.18)), True),  # from the side
+        (((0.2, 0.19), (0.28, 0.1), (0.5, 0.22), (0.6, 0.7), (1.6, 0.18)), True),  # an arm ahead
+        (((1.6, 0.2),), False),  # a post
+        (((0.3, 0.3), (1.6, 0.05)), False),  # a lamp
+        (((0.2, 0.2), (0.28, 0.18), (1.6, 0.22)), False),  # a post with a groove
+        (((0.2, 0.2), (0.28, 0.1), (1.0, 0.26)), False),  # a chair with a head rest
+    ],
+)
+def test_whoever_is_tall_and_has_a_neck_is_a_person(
+    rows: tuple[tuple[float, float], ...], person: bool
+):
+    depth, top = wall(), 0.0
+    for bottom, wide in rows:
+        v0, v1 = (round((TOP + y) * CAMERA.fy / 2.5 + CAMERA.cy) for y in (top, bottom))
+        # An arm is ahead on one side.
+        u0 = round(-0.13 * CAMERA.fx / 2.5 + CAMERA.cx)
+        depth[max(v0, 0) : v1, u0 : u0 + round(wide * CAMERA.fx / 2.5)] = 2.5
+        top = bottom
+    assert upright(silhouette(depth), CAMERA, None) == person
+
+
+@pytest.mark.parametrize(('high', 'people'), [(0, True), (55, False)])
+def test_two_people_who_touch_in_the_first_frame_are_not_the_room_and_two_chairs_are(
+    high: int, people: bool
+):
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    pair = [Someone(-0.205, 3.0), Someone(0.205, 3.0)]
+    color, depth = images(pair)
+    if high:  # nothing but heads and shoulders, on the floor
+        depth[int(pair[0].box.y) + high :] = WALL
+    scene = reader.read(Frame(color, depth, 0, CAMERA), 0.0)
+    assert scene is not None
+    for one in pair:
+        assert scene.before[int(one.box.y) + 25, int(one.box.cx)] == people
 
 
 def test_a_person_who_stands_in_the_first_frame_is_not_the_room():

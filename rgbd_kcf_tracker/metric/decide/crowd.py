@@ -27,7 +27,8 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import APART, UPRIGHT, Figure, find_figures, place_of
+from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures, place_of
+from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
@@ -333,6 +334,11 @@ class Crowd:
 
     def chosen(self, account: Account, seen: Silhouette) -> Person:
         """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
+        person = self._chosen(account, seen)
+        self._introduce(account, {person.number: seen})
+        return person
+
+    def _chosen(self, account: Account, seen: Silhouette) -> Person:
         index = account.figure_of(seen)
         owner = account.owner[index] if index >= 0 else -1
         beside = (

@@ -165,14 +165,14 @@ class SceneReader:
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
-            people = upright_people(view, surfaces, elevation, self._rim)
+            people = upright_people(view, surfaces, elevation, forward, self._rim)
             self.room.restart(view.depth, people)
             self._light.restart()
         else:
             somebody = self.somebody
             if isinstance(motion, Pose):
                 unknown = self.room.moved(motion, view.intrinsics)
-                people = upright_people(view, surfaces, elevation, self._rim)
+                people = upright_people(view, surfaces, elevation, forward, self._rim)
                 people |= self.room.going_on(view.depth, surfaces)
                 self.room.open(people & unknown, view.depth)
                 self._light.restart()

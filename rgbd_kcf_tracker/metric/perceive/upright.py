@@ -15,29 +15,37 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.parting import parted
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
+
+FloatArray = npt.NDArray[np.float64]
 
 HEIGHT = (0.6, 2.1)
 """Metres from the head down to what shows: half of a small person to all of a tall one."""
 TOP = (0.9, 2.15)
 """Metres of the head's top above the floor."""
 WIDTH = (0.25, 1.0)
+GROUP = 2.5
+"""Metres of people who touch, at the most."""
 HEAD = (0.03, 0.2)
+NECK = (0.18, 0.34)
 SHOULDERS = (0.3, 0.5)
-"""Metres below the top between which the head is measured, and the shoulders."""
+TRUNK = (0.3, 0.8)
+"""Metres below the top between which the head is measured, and the rest."""
 HEAD_WIDTH = (0.09, 0.34)
 SHOULDER_WIDTH = (0.26, 0.8)
+TRUNK_WIDTH = (0.13, 0.8)
 BROADER = 1.35
 """Shoulders against head, at the least."""
+SLENDER, STOUTER = 0.75, 0.8
+"""Neck against head, at the most, and trunk against head, at the least."""
 SLIM = 0.85
 """Width against height, at the most, where nothing is cut off below."""
 FILL = 0.45
 """Share of the box that a body fills, at the least: a rack or a plant fills less."""
 LENGTH = (1.2, 0.8)
 """Metres of a person whose shape is not told: whole, and cut off above or below."""
-BROADER_SIDEWAYS, TALL, NARROW = 1.1, 1.2, 0.45
-"""The same of somebody seen from the side, who must show 1.2 m and be no wider than 45 % of it."""
 
 
 def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
@@ -54,25 +62,43 @@ def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
         return False
     if top is not None and not TOP[0] <= top <= TOP[1]:
         return False
+    wide = np.count_nonzero(seen.mask, axis=1) * (seen.depth / k.fx)
+    per_row = k.fy / seen.depth
+    return _shouldered(seen, wide, per_row) or _necked(seen, wide, per_row)
+
+
+def _shouldered(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
+    """Whether it has shoulders that are broader than its head: somebody seen from the front."""
     if not seen.cut.bottom and seen.width > SLIM * seen.height:
         return False
     if seen.area < FILL * seen.width * seen.height:
         return False
-    pixel = seen.depth / k.fx
-    per_row = k.fy / seen.depth
-    wide = np.count_nonzero(seen.mask, axis=1) * pixel
-    head = wide[int(HEAD[0] * per_row) : max(int(HEAD[1] * per_row), 1)]
-    rows = slice(int(SHOULDERS[0] * per_row), max(int(SHOULDERS[1] * per_row), 1))
-    shoulders = wide[rows]
-    if not len(head) or not len(shoulders):
-        return False
+    head, shoulders = _rows(wide, HEAD, per_row), _rows(wide, SHOULDERS, per_row)
     head_width, shoulder_width = float(median(head.tolist())), float(median(shoulders.tolist()))
     if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
         return False
     if not SHOULDER_WIDTH[0] <= shoulder_width <= SHOULDER_WIDTH[1]:
         return False
-    sideways = seen.height >= TALL and seen.width <= NARROW * seen.height
-    return shoulder_width >= (BROADER_SIDEWAYS if sideways else BROADER) * head_width
+    return shoulder_width >= BROADER * head_width
+
+
+def _necked(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
+    """Whether it is tall and has a neck: somebody seen from any side, whatever the arms do."""
+    if seen.height < LENGTH[0]:
+        return False
+    head, neck, trunk = (_rows(wide, rows, per_row) for rows in (HEAD, NECK, TRUNK))
+    head_width, trunk_width = float(head.max()), float(median(trunk.tolist()))
+    if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
+        return False
+    if not max(TRUNK_WIDTH[0], STOUTER * head_width) <= trunk_width <= TRUNK_WIDTH[1]:
+        return False
+    return float(neck.min()) <= SLENDER * head_width
+
+
+def _rows(wide: FloatArray, below: tuple[float, float], per_row: float) -> FloatArray:
+    """Widths of the rows that lie so many metres below the top, of one at least."""
+    first = int(below[0] * per_row)
+    return wide[first : max(int(below[1] * per_row), first + 1)]
 
 
 def person_sized(seen: Silhouette) -> bool:
@@ -93,27 +119,39 @@ def upright_people(
     view: DepthView,
     surfaces: Surfaces,
     elevation: npt.NDArray[np.float32] | None,
+    forward: npt.NDArray[np.float32],
     rim: Rim,
 ) -> npt.NDArray[np.bool_]:
-    """The pixels of all surfaces that have the shape of a person, ``(h, w)`` bool.
+    """The pixels of all surfaces and parts of them that have a person's shape, ``(h, w)`` bool.
 
     Args:
         view: the depth.
         surfaces: what stands on the floor.
         elevation: ``(h, w)`` metres above the floor, None where none is known.
+        forward: ``(h, w)`` metres along the floor.
         rim: of the view.
     """
     k = view.intrinsics
     z = surfaces.depth.astype(np.float64)
     tall = surfaces.boxes[:, 3] * z / k.fy
     wide = surfaces.boxes[:, 2] * z / k.fx
-    possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0]) & (wide <= WIDTH[1])
+    possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
     possible[0] = False
-    member = np.zeros(len(surfaces), np.bool_)
-    for label in np.flatnonzero(possible):
+    people = np.zeros(view.shape, np.bool_)
+    for label in np.flatnonzero(possible & (wide <= GROUP)):
         left, upper, width, height = (int(v) for v in surfaces.boxes[label])
         mask = surfaces.labels[upper : upper + height, left : left + width] == label
-        seen = Silhouette.of(view, left, upper, mask, int(label), rim)
-        member[label] = upright(seen, k, seen.highest(elevation))
-    people: npt.NDArray[np.bool_] = member[surfaces.labels]
+        whole = Silhouette.of(view, left, upper, mask, int(label), rim)
+        found = [whole]
+        if not upright(whole, k, whole.highest(elevation)):
+            parts = parted(view, forward, left, upper, mask)
+            several = [Silhouette.of(view, *part, 0, rim) for part in parts if len(parts) > 1]
+            # Two chairs beside each other have two heads as well.
+            found = [
+                one
+                for one in several
+                if one.height >= LENGTH[0] and upright(one, k, one.highest(elevation))
+            ]
+        for one in found:
+            people[one.rows, one.cols] |= one.mask
     return people
