@@ -862,12 +862,75 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
         assert track.box.iou(one.box) > 0.9
 
 
+@pytest.mark.parametrize(('silent', 'found'), [(2, True), (4, False)])
+def test_who_comes_between_two_frames_came_in_time_if_the_first_was_in_time(
+    silent: int, found: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """A frame a second: the look is lost in the second, depth shows him in the third."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    for i in range(silent + 1):
+        one = Someone(-0.5 + 0.1 * i, 3.0)
+        color, depth = images([one])
+        if i < silent:
+            depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == found
+
+
+@pytest.mark.parametrize('own', [True, False])
+def test_who_has_the_number_but_not_the_look_of_one_who_stood_beside_may_be_the_target(
+    own: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """Depth showed another; in the next frame he has gone and the target stands where he did."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'likely', lambda *args: 0.9)
+    tracker = create_tracker('metric')
+    beside = Someone(0.15, 3.1, GREEN, BLUE)
+    for i in range(2):
+        one = Someone(-0.5 + 0.55 * i, 3.0)
+        color, depth = images([one, beside] if i == 0 else [one] if own else [beside])
+        if i == 0:
+            depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(0.5e9 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == own
+    if track.box is not None:
+        assert track.box.iou(one.box) > 0.9
+
+
+def test_who_stands_beside_the_target_when_it_is_chosen_has_met_it():
+    """They are two, whatever they look like when they come back; a thing is no figure yet."""
+    targets = TargetSet('metric')
+    thing, other = Box(60, 90, 30, 40), Someone(0.6, 3.0)
+    color, depth = images([other])
+    depth[90:130, 60:90] = 3.0
+    number = targets.add(Frame(color, depth, 0, CAMERA), thing)
+    assert targets.metric is not None
+    person = targets.metric.person(number)
+    assert person is not None
+    assert len(person.met) == 1
+
+
+def test_of_two_who_touch_in_the_first_frame_one_is_chosen_alone():
+    """Wider than a person, they are no part of the room, and not one."""
+    tracker = create_tracker('metric')
+    for i in range(4):
+        # The other stays; the target has gone.
+        pair = [Someone(-0.205, 3.0), Someone(0.205, 3.0, GREEN, BLUE)]
+        wide = dataclasses.replace(pair[0].box, width=1.6 * pair[0].box.width)
+        frame = picture(pair if i == 0 else pair[1:], 1.0 * i)
+        track = tracker.start(frame, wide) if i == 0 else tracker.update(frame)
+        assert (track.box is None) == (i > 0)
+
+
 def test_a_look_does_not_go_over_to_who_stood_beside_in_the_first_frame(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """Depth shows nothing of the target, but of him, who is somebody else."""
     one, other = Someone(-0.8, 3.5), Someone(0.7, 2.5)
-    monkeypatch.setattr(ByLook, 'step', lambda *args: Look(other.box, 1.0, other.z))
+    monkeypatch.setattr(ByLook, 'step', lambda *args: Look(other.box, 1.0, 1.0, other.z))
     tracker = create_tracker('metric')
     for i in range(6):
         color, depth = images([one, other])

@@ -414,6 +414,7 @@ def test_a_target_that_comes_fast_is_followed_on_colour_alone():
     for frame, size in zip(frames[1:], sizes[1:], strict=False):
         found = look.step(frame, 0.1)
         assert found is not None
+        look.take(frame, found, 0.1)
         assert found.box.iou(Box.from_center(150, 150, size, 1.2 * size)) > 0.6
 
 
@@ -440,6 +441,13 @@ def test_a_place_is_unchanged_where_it_looks_as_it_did_while_the_target_was_else
     assert not elsewhere.unchanged(at(50)[0][:, :70], at(30)[1])
     elsewhere.forget()
     assert not elsewhere.unchanged(at(50)[0], at(30)[1])
+    elsewhere.refuse(at(50)[0], at(30)[1])
+    assert elsewhere.unchanged(at(70)[0], at(30)[1])
+    assert not elsewhere.unchanged(*at(30))  # it has come there
+    assert not elsewhere.unchanged(at(70)[0], at(10)[1])  # nothing was said of that place
+    elsewhere.keep(*at(50))
+    elsewhere.keep(*at(30))
+    assert not elsewhere.unchanged(*at(30))
 
 
 def test_on_colour_alone_what_always_stood_there_is_not_the_target():
@@ -457,9 +465,36 @@ def test_on_colour_alone_what_always_stood_there_is_not_the_target():
     for i in range(1, 16):
         found = look.step(at(i, i < 10), 0.1)
         assert (found is not None) == (i < 10)
+        if found is not None:
+            look.take(at(i, True), found, 0.1)
     found = look.step(at(16, True), 0.1)
     assert found is not None
     assert found.box.iou(Box(94, 200, 60, 60)) > 0.7
+
+
+def test_nothing_is_learned_of_what_is_refused_and_it_is_not_found_again_until_it_changes():
+    """Where the target was shows something nearly as likely, which depth says is not it."""
+    patch, wall, box = blobs(3, 60), blobs(8, 320) // 2, Box(130, 130, 60, 60)
+    alike = cv2.addWeighted(patch, 0.7, blobs(21, 60), 0.3, 0)
+
+    def at(i: int, what: np.ndarray) -> Frame:
+        image = wall.copy()
+        image[130:190, 130:190] = what
+        return Frame(image, None, i * 1_000_000_000)
+
+    look = ByLook(at(0, patch), box, MetricParameters())
+    before = look.glance(at(0, patch), box, 1.0)
+    found = look.step(at(1, alike), 1.0)
+    assert before is not None
+    assert found is not None
+    assert found.ratio > MetricParameters().seen_ratio
+    look.refuse(at(1, alike), found)
+    for i in (2, 3):
+        assert look.step(at(i, alike), 1.0) is None
+    found = look.step(at(4, patch), 1.0)
+    assert found is not None
+    assert found.box.iou(box) > 0.9
+    assert found.ratio == pytest.approx(before.ratio, rel=0.05)
 
 
 def test_windows_reach_outside_the_image_and_shrink_large_ones():

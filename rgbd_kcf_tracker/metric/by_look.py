@@ -49,11 +49,13 @@ class Look:
     Attributes:
         box: in pixels.
         ratio: the filter's response against its own recent mean.
+        peak: the response.
         depth: of the target in metres, None where there is no reading on it.
     """
 
     box: Box
     ratio: float
+    peak: float
     depth: float | None
 
 
@@ -89,14 +91,19 @@ class ByLook:
         self._elsewhere = Elsewhere()
         self._elsewhere.keep(_small(frame), box.over(_step_of(frame)))
         self._flow = TextureFlow()
-        self._keep(frame, True)
+        self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unlearned = 0.0
         self._to_learn: tuple[Frame, Box, float] | None = None
 
     def step(self, frame: Frame, dt: float) -> Look | None:
-        """Look for the target in the next frame, ``dt`` seconds later; None where it is hidden."""
+        """Look for the target in the next frame, ``dt`` seconds later.
+
+        Returns:
+            Where it is, or None where it is hidden. :meth:`take` or :meth:`refuse` must follow
+            where it is not.
+        """
         parameters = self._parameters
         self._follow_size(frame)
         small = _small(frame)
@@ -113,11 +120,24 @@ class ByLook:
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio
         self.response = sighting.ratio
-        look = None if self._hidden else self._taken(frame, sighting, dt)
-        if look is not None and look.ratio > parameters.seen_ratio:
-            self._elsewhere.keep(small, look.box.over(_step_of(frame)))
-        self._keep(frame, look is not None)
-        return look
+        if self._hidden:
+            self._flow.forget()
+            return None
+        return self._found(frame, sighting, dt)
+
+    def take(self, frame: Frame, look: Look, dt: float) -> None:
+        """Learn from what :meth:`step` found."""
+        if look.ratio > self._parameters.seen_ratio:
+            self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
+            rate = min(0.15, SCALE_RATE * dt * 30)
+            self._scales.learn(
+                frame.color, self._cx, self._cy, look.box.width, look.box.height, rate
+            )
+            self._appearance.remember_peak(look.peak, dt)
+            self._elsewhere.keep(_small(frame), look.box.over(_step_of(frame)))
+        else:
+            self._appearance.remember_peak(look.peak, 0.3 * dt)
+        self._keep(frame)
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
@@ -128,7 +148,7 @@ class ByLook:
         if sighting.ratio < self._parameters.seen_ratio:
             return None
         # Nothing bears out that this is the target: it is not learned from.
-        return self._taken(frame, sighting, dt, learn=False)
+        return self._found(frame, sighting, dt)
 
     def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
         """Have :meth:`settle` learn from a target found by other means.
@@ -160,9 +180,11 @@ class ByLook:
         """
         return float(self._appearance.posterior(image)[mask].mean())
 
-    def refuse(self) -> None:
-        """Take back what :meth:`step` found: the target is hidden."""
+    def refuse(self, frame: Frame, look: Look) -> None:
+        """What :meth:`step` found is something else: the target is hidden."""
         self._hidden = True
+        self._elsewhere.refuse(_small(frame), look.box.over(_step_of(frame)))
+        self._flow.forget()
 
     def _follow_size(self, frame: Frame) -> None:
         """Carry the target over to a stream whose image size has changed."""
@@ -182,8 +204,8 @@ class ByLook:
         """Whether depth tells nothing of the target's size."""
         return frame.depth is None or self._first_depth is None
 
-    def _keep(self, frame: Frame, seen: bool) -> None:
-        if seen and self._depthless(frame):
+    def _keep(self, frame: Frame) -> None:
+        if self._depthless(frame):
             self._flow.keep(
                 frame.color, self._cx, self._cy, *self._size, self._appearance.posterior
             )
@@ -253,23 +275,13 @@ class ByLook:
             ] = -np.inf
         return best
 
-    def _taken(self, frame: Frame, sighting: Sighting, dt: float, learn: bool = True) -> Look:
+    def _found(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
         self._cx = float(np.clip(sighting.cx, 0, frame.width))
         self._cy = float(np.clip(sighting.cy, 0, frame.height))
-        box = Box.from_center(self._cx, self._cy, *self._size)
-        depth = depth_in(frame, box)
+        depth = depth_in(frame, Box.from_center(self._cx, self._cy, *self._size))
         self._rescale(frame, depth, sighting, dt)
         box = Box.from_center(self._cx, self._cy, *self._size)
-        if not learn:
-            return Look(box, sighting.ratio, depth)
-        if sighting.ratio > self._parameters.seen_ratio:
-            self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
-            rate = min(0.15, SCALE_RATE * dt * 30)
-            self._scales.learn(frame.color, self._cx, self._cy, box.width, box.height, rate)
-            self._appearance.remember_peak(sighting.peak, dt)
-        else:
-            self._appearance.remember_peak(sighting.peak, 0.3 * dt)
-        return Look(box, sighting.ratio, depth)
+        return Look(box, sighting.ratio, sighting.peak, depth)
 
     def _rescale(self, frame: Frame, depth: float | None, sighting: Sighting, dt: float) -> None:
         """Follow the size: by depth where it is known, else by the look."""

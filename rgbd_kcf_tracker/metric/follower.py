@@ -309,13 +309,16 @@ class Follower:
             if unlike or any(
                 refused(account, look.box) for refused in (self._stands, self._taken, self._far)
             ):
-                self._look.refuse()
+                self._look.refuse(frame, look)
                 look = None
         if look is not None:
+            self._look.take(frame, look, dt)
             self._last_box, self._unseen, self._carried = look.box, 0.0, False
         else:
             self._unseen += dt
-        if account is not None and self._unseen < NEWCOMER and self._agree(frame, account, look):
+        # He came at some time since the frame before, that is in time where that was.
+        in_time = self._unseen - dt < NEWCOMER
+        if account is not None and in_time and self._agree(frame, account, look):
             assert self._surface is not None
             assert self.seen is not None
             box = outline_box(account.scene, self.seen)
@@ -383,7 +386,8 @@ class Follower:
         best, likest = None, 0.0
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
-            if row >= 0 and account.people[row].first_seen <= self._since:
+            known = row >= 0 and account.people[row].first_seen <= self._since
+            if known and account.looks[row, column] > 0:
                 continue
             if sight.figure.parted:  # where it ends is a guess
                 continue

@@ -24,7 +24,10 @@ person's box up to half shows what is behind."""
 
 
 class Elsewhere:
-    """Pictures in which the target was surely seen, the first and the last, and where it was.
+    """Pictures that tell where the target was not.
+
+    The first and the last in which it was surely seen somewhere else, and the last in which what
+    was found was something else.
 
     The camera must stand still for them to say anything: where it has moved, a place has changed,
     and nothing is refused.
@@ -32,14 +35,20 @@ class Elsewhere:
 
     def __init__(self) -> None:
         self._kept: list[tuple[Image, Box]] = []
+        self._refused: tuple[Image, Box] | None = None
 
     def keep(self, image: Image, box: Box) -> None:
         """Take a picture, ``(h, w, 3)`` uint8 BGR, and where the target is in it, in its pixels."""
         self._kept = [*self._kept[:1], (image, box)]
+        self._refused = None
+
+    def refuse(self, image: Image, box: Box) -> None:
+        """Take a picture of which a box shows something else than the target."""
+        self._refused = image, box
 
     def forget(self) -> None:
         """Drop all: the camera has moved."""
-        self._kept = []
+        self._kept, self._refused = [], None
 
     def unchanged(self, image: Image, box: Box) -> bool:
         """Whether a box shows what was there while the target was elsewhere.
@@ -49,19 +58,28 @@ class Elsewhere:
             box: in its pixels.
         """
         part = _part(image, box.scaled(MIDDLE))
-        now = image[part]
         for then, place in self._kept:
-            if then.shape != image.shape or not now.size:
-                continue
-            elsewhere = np.ones(image.shape[:2], np.bool_)
-            elsewhere[_part(image, place)] = False
-            there = elsewhere[part]
-            if np.count_nonzero(there) <= OUTSIDE * there.size:
-                continue
-            change = cv2.absdiff(now, then[part]).max(axis=2)[there]
-            if float(np.mean(change < SAME_COLOR)) > UNCHANGED:
+            elsewhere = np.ones(then.shape[:2], np.bool_)
+            elsewhere[_part(then, place)] = False
+            if _same(image, then, part, elsewhere):
                 return True
+        if self._refused is None:
+            return False
+        then, place = self._refused
+        there = np.zeros(then.shape[:2], np.bool_)
+        there[_part(then, place)] = True
+        return _same(image, then, part, there)
+
+
+def _same(now: Image, then: Image, part: tuple[slice, slice], there: npt.NDArray[np.bool_]) -> bool:
+    """Whether a part of a picture shows what it showed, as far as ``there`` tells of it."""
+    if then.shape != now.shape:
         return False
+    there = there[part]
+    if np.count_nonzero(there) <= OUTSIDE * there.size:
+        return False
+    change = cv2.absdiff(now[part], then[part]).max(axis=2)[there]
+    return float(np.mean(change < SAME_COLOR)) > UNCHANGED
 
 
 def _part(image: Image, box: Box) -> tuple[slice, slice]:
