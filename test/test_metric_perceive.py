@@ -176,6 +176,21 @@ def test_what_shows_behind_who_has_gone_is_the_room_where_it_goes_on_as_the_room
     assert not room.before[:35].any(), 'the wall behind is farther than he can have stepped back'
 
 
+def test_who_stood_there_before_another_passed_is_not_the_room_though_some_of_him_is():
+    """Readings that he lacked at first passed for the room; with one step he has left others."""
+    first = with_thing(3.0)
+    somebody = first == 3.0
+    somebody[40:100, 72:75] = False
+    room = Room()
+    room.restart(first, somebody)
+    stepped, passer = wall(), wall()
+    stepped[40:100, 52:82] = 3.0
+    passer[35:120, 50:100] = 2.4
+    for seen in (stepped, passer, stepped, stepped):
+        see(room, seen, 1.0, None)
+    assert room.before[40:100, 52:72].all()
+
+
 def test_who_steps_back_to_a_far_wall_does_not_become_the_wall():
     first = wall(4.45)
     first[THING] = 4.0

@@ -95,30 +95,36 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
 def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -> Mask:
     """Surfaces, ``(n,)`` bool, that are the room where a part of them meets what is known.
 
+    They do not stand before it more than they are of it, either.
+
     Args:
         part: ``(h, w)`` bool, the part.
         known: ``(h, w)`` bool, pixels with a reading where the room is known.
         nearer: ``(h, w)`` bool, those of them that show something before it.
         surfaces: of the view.
     """
+    before, of_it = (
+        np.bincount(surfaces.labels[each], minlength=len(surfaces))
+        for each in (known & nearer, known & ~nearer)
+    )
     left, top, width, height = cv2.boundingRect(part.view(np.uint8))
     about = slice(max(top - 1, 0), top + height + 1), slice(max(left - 1, 0), left + width + 1)
     part, known, labels = part[about], known[about], surfaces.labels[about]
     room = known & ~nearer[about]
     meets, goes_on = np.zeros((2, len(surfaces)), np.intp)
-    before, after = np.s_[:-1], np.s_[1:]
+    first, last = np.s_[:-1], np.s_[1:]
     for here, there in (
-        (np.s_[:, before], np.s_[:, after]),
-        (np.s_[:, after], np.s_[:, before]),
-        (np.s_[before, :], np.s_[after, :]),
-        (np.s_[after, :], np.s_[before, :]),
+        (np.s_[:, first], np.s_[:, last]),
+        (np.s_[:, last], np.s_[:, first]),
+        (np.s_[first, :], np.s_[last, :]),
+        (np.s_[last, :], np.s_[first, :]),
     ):
         ends = np.nonzero(part[here] & known[there])
         mine = labels[here][ends]
         same = room[there][ends] & (mine == labels[there][ends])
         meets += np.bincount(mine, minlength=len(meets))
         goes_on += np.bincount(mine[same], minlength=len(meets))
-    result: Mask = goes_on > MOST * meets
+    result: Mask = (goes_on > MOST * meets) & (before <= of_it)
     result[0] = False
     return result
 
