@@ -913,6 +913,21 @@ def test_who_stands_beside_the_target_when_it_is_chosen_has_met_it():
     assert len(person.met) == 1
 
 
+@pytest.mark.parametrize('side', [-1, 1])
+def test_of_whom_depth_shows_a_part_colour_shows_the_rest_though_nobody_chose_him(side: int):
+    """A registered depth image often covers less than the colour image."""
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(12):
+        one = Someone(side * (0.2 + 0.1 * i), 3.0)
+        color, depth = images([one])
+        depth[:, :30] = depth[:, -30:] = np.nan
+        tracks = targets.update(Frame(color, depth, round(1e8 * i), CAMERA))
+    (track,) = tracks.values()
+    assert track.box is not None
+    assert track.box.iou(one.box) > 0.9
+
+
 def test_of_two_who_touch_in_the_first_frame_one_is_chosen_alone():
     """Wider than a person, they are no part of the room, and not one."""
     tracker = create_tracker('metric')

@@ -25,10 +25,31 @@ LIKE = 0.25
 
 
 def outline_box(scene: Scene, seen: Silhouette) -> Box:
-    """The box of a silhouette of whose body nothing more is known, down to its feet."""
+    """The box of a silhouette in pixels of the image, of whose body nothing more is known.
+
+    See :func:`visible_box`.
+    """
+    if any(_at_rim(scene, seen)):
+        body, top = Body(seen), seen.metres[1]
+        body.learn_colors(seen, scene.codes, scene.view, top, None)
+        wide = seen.mask.shape[1]
+        first = max(seen.left - wide, 0)
+        beside = scene.view.depth[seen.rows, first : seen.cols.stop + wide] > 0
+        beside[:, seen.left - first : seen.cols.stop - first] &= ~seen.mask
+        body.learn_around(scene.codes[seen.rows, first : seen.cols.stop + wide], beside, None)
+        return visible_box(scene, body, seen, top)
     step = scene.view.step
     return Box.from_corners(
         seen.left * step, seen.top * step, seen.cols.stop * step, _foot(scene, seen) * step
+    )
+
+
+def _at_rim(scene: Scene, seen: Silhouette) -> tuple[bool, bool]:
+    """Whether a silhouette ends at its left, and at its right, where only colour goes on."""
+    rim, end = scene.rim, scene.view.shape[1] - scene.rim.right
+    return (
+        rim.left > RIM and seen.left <= rim.left + RIM,
+        rim.right > RIM and seen.cols.stop >= end - RIM,
     )
 
 
@@ -59,10 +80,10 @@ def visible_box(scene: Scene, body: Body, seen: Silhouette, top: float) -> Box:
     cols = seen.mask.shape[1]
     left, right = float(seen.left), float(seen.left + cols)
     bottom = _foot(scene, seen)
-    width = scene.view.shape[1]
-    if scene.rim.left > RIM and left <= scene.rim.left + RIM:
+    goes_on = _at_rim(scene, seen)
+    if goes_on[0]:
         left -= _beyond_rim(scene, body, seen, top, -1)
-    if scene.rim.right > RIM and right >= width - scene.rim.right - RIM:
+    if goes_on[1]:
         right += _beyond_rim(scene, body, seen, top, 1)
     step = scene.view.step
     return Box.from_corners(left * step, seen.top * step, right * step, bottom * step)
