@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.parting import parted
+from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 
@@ -137,21 +137,25 @@ def upright_people(
     wide = surfaces.boxes[:, 2] * z / k.fx
     possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
     possible[0] = False
+    one = wide <= WIDTH[1]
+    # Two chairs beside each other have two heads as well.
+    several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
     people = np.zeros(view.shape, np.bool_)
-    for label in np.flatnonzero(possible & (wide <= GROUP)):
+    for label in np.flatnonzero(possible & (one | several)):
         left, upper, width, height = (int(v) for v in surfaces.boxes[label])
         mask = surfaces.labels[upper : upper + height, left : left + width] == label
-        whole = Silhouette.of(view, left, upper, mask, int(label), rim)
-        found = [whole]
-        if not upright(whole, k, whole.highest(elevation)):
+        found = []
+        if one[label]:
+            whole = Silhouette.of(view, left, upper, mask, int(label), rim)
+            found = [whole] if upright(whole, k, whole.highest(elevation)) else []
+        if not found and several[label]:
             parts = parted(view, forward, left, upper, mask)
-            several = [Silhouette.of(view, *part, 0, rim) for part in parts if len(parts) > 1]
-            # Two chairs beside each other have two heads as well.
+            cut = [Silhouette.of(view, *part, 0, rim) for part in parts if len(parts) > 1]
             found = [
-                one
-                for one in several
-                if one.height >= LENGTH[0] and upright(one, k, one.highest(elevation))
+                part
+                for part in cut
+                if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
-        for one in found:
-            people[one.rows, one.cols] |= one.mask
+        for seen in found:
+            people[seen.rows, seen.cols] |= seen.mask
     return people
