@@ -21,6 +21,14 @@ Scalar = bool | int | float | str
 T = TypeVar('T')
 
 
+_KINDS: dict[type, str] = {
+    bool: 'true or false',
+    int: 'a whole number',
+    float: 'a number',
+    str: 'text',
+}
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterInfo:
     """What is known of one parameter beyond its value.
@@ -121,9 +129,7 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
     if info.type is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if type(value) is not info.type:
-        raise ParameterError(
-            f'parameter {info.name} must be of type {info.type.__name__}, not {value!r}'
-        )
+        raise ParameterError(f'parameter {info.name} is {value!r}: it must be {_kind_text(info)}')
     if isinstance(value, float) and not math.isfinite(value):
         raise ParameterError(f'parameter {info.name} is {value}: it must be finite')
     if isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -156,7 +162,7 @@ def parsed(info: ParameterInfo, text: str) -> Scalar:
         raise
     except ValueError:
         raise ParameterError(
-            f'parameter {info.name} is {text!r}: give a value of type {info.type.__name__}'
+            f'parameter {info.name} is {text!r}: it must be {_kind_text(info)}'
         ) from None
 
 
@@ -177,6 +183,14 @@ def with_overrides(parameters: T, overrides: Mapping[str, str]) -> T:
 
 def _unknown(name: str, known: set[str]) -> str:
     return f'unknown parameter {name!r}: choose from {", ".join(sorted(known))}'
+
+
+def _kind_text(info: ParameterInfo) -> str:
+    """What a value must be, in words, with its range where it has one."""
+    kind = _KINDS[info.type]
+    if info.minimum is None and info.maximum is None:
+        return kind
+    return f'{kind}, {_range_text(info)}'
 
 
 def _range_text(info: ParameterInfo) -> str:

@@ -234,7 +234,7 @@ def test_trackers_of_another_name_are_pointed_out(
         ({}, 'set the parameter bag'),
         ({'bag': 'no/such/file.mcap'}, 'no/such/file.mcap does not exist'),
         ({'rate': -1.0}, 'parameter rate is -1.0'),
-        ({'rate': 'fast'}, 'parameter rate must be of type float'),
+        ({'rate': 'fast'}, "parameter rate is 'fast': it must be a number"),
         ({'speed': 1.0}, "unknown parameter 'speed'"),
         ({'bag': 'BAG', 'topics': '/nothing'}, 'has no topic /nothing'),
         ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 0.0}, 'ends before start'),
