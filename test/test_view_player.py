@@ -242,7 +242,8 @@ def test_everyone_in_view_is_what_the_set_says_of_the_frame() -> None:
     expected = [[round(v, 2) for v in t.box.as_tuple()] if t.box else None for t in tracks.values()]
     assert list(boxes_of(seen).values()) == expected
     assert [t['chosen'] for t in seen['targets']] == [number == chosen for number in tracks]
-    assert [t['name'] for t in seen['targets']][:2] == ['target 1', 'person 2']
+    names = {t['id']: t['name'] for t in seen['targets']}
+    assert names == {key: f'{"target" if key == 1 else "person"} {key}' for key in names}
     rows = list(csv.DictReader(io.StringIO(rig.player.boxes_csv())))
     assert {row['id'] for row in rows} >= {str(t['id']) for t in seen['targets']}
 
