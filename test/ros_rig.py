@@ -96,7 +96,13 @@ class Rig:
         def listen(kind: Any, topic: str, keep: Callable[[Any], None]) -> None:
             self.node.create_subscription(kind, topic, keep, qos)
 
-        listen(PolygonStamped, f'{tracker}/box', self.boxes.append)
+        # The box is sent last, and is what is waited for: it is kept when all that has come with it
+        # is, which the executor would take in the order of subscriptions.
+        listen(
+            PolygonStamped,
+            f'{tracker}/box',
+            lambda m: self.executor.create_task(self.boxes.append, m),
+        )
         listen(Bool, f'{tracker}/occluded', lambda m: self.occluded.append(m.data))
         listen(RegionOfInterest, f'{tracker}/roi', self.rois.append)
         listen(PointStamped, f'{tracker}/position', self.positions.append)
