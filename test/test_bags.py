@@ -592,6 +592,14 @@ def test_damaged_bytes_never_crash_the_reader(
             frame.color.sum()
 
 
+def test_a_database_whose_column_of_ids_is_damaged_is_read_by_its_rows(tmp_path: Path) -> None:
+    path = WRITERS['db3'](tmp_path, _SOURCES['db3'])
+    before, _, after = path.read_bytes().partition(b'CREATE TABLE messages')
+    path.write_bytes(before + b'CREATE TABLE messages' + after.replace(b'PRIMARY', b'PRI ARY', 1))
+    with open_recording(path) as recording:
+        assert len(list(recording.frames())) == 2
+
+
 WRITE_FOR_EVER = """
 import sys
 import dataclasses

@@ -119,15 +119,16 @@ class SqliteStorage:
             )
 
     def _rows(self) -> Iterator[tuple[Any, ...]]:
-        columns = f'SELECT id, topic_id, timestamp, length(data), substr(data, 1, {HEAD})'
+        # The rowid is the id, and is a number even where damage has made that another column.
+        columns = f'SELECT rowid, topic_id, timestamp, length(data), substr(data, 1, {HEAD})'
         if not is_cut_off(self.path):
-            yield from self._database.execute(f'{columns} FROM messages ORDER BY id')
+            yield from self._database.execute(f'{columns} FROM messages ORDER BY rowid')
             return
         self.warnings.append(f'{self.path} was cut off: all whole messages in it are read')
         query = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
         root = self._database.execute(query).fetchone()
         for number in whole_rows(self.path, int(root[0]) if root else 0):
-            yield from self._database.execute(f'{columns} FROM messages WHERE id = ?', (number,))
+            yield from self._database.execute(f'{columns} FROM messages WHERE rowid = ?', (number,))
 
     def _read_definitions(self) -> None:
         query = 'SELECT topic_type, encoding, encoded_message_definition FROM message_definitions'
@@ -142,7 +143,7 @@ class SqliteStorage:
         """See :meth:`Storage.read`."""
         try:
             row = self._database.execute(
-                'SELECT data FROM messages WHERE id = ?', (where[1],)
+                'SELECT data FROM messages WHERE rowid = ?', (where[1],)
             ).fetchone()
         except _ERRORS as error:
             raise RecordingError(f'{self.path} cannot be read on: {error}') from None
