@@ -89,7 +89,8 @@ class ByLook:
         self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
         self._first_depth = self._depth = depth_in(frame, box)
         self._elsewhere = Elsewhere()
-        self._elsewhere.keep(_small(frame), box.over(_step_of(frame)))
+        self._small = _small(frame)
+        self._elsewhere.keep(self._small, box.over(_step_of(frame)))
         self._flow = TextureFlow()
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
@@ -106,7 +107,7 @@ class ByLook:
         """
         parameters = self._parameters
         self._follow_size(frame)
-        small = _small(frame)
+        small = self._small = _small(frame)
         if self._hidden:
             sighting = self._searched(frame, small, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
@@ -134,7 +135,7 @@ class ByLook:
                 frame.color, self._cx, self._cy, look.box.width, look.box.height, rate
             )
             self._appearance.remember_peak(look.peak, dt)
-            self._elsewhere.keep(_small(frame), look.box.over(_step_of(frame)))
+            self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
         else:
             self._appearance.remember_peak(look.peak, 0.3 * dt)
         self._keep(frame)
@@ -183,7 +184,7 @@ class ByLook:
     def refuse(self, frame: Frame, look: Look) -> None:
         """What :meth:`step` found is something else: the target is hidden."""
         self._hidden = True
-        self._elsewhere.refuse(_small(frame), look.box.over(_step_of(frame)))
+        self._elsewhere.refuse(self._small, look.box.over(_step_of(frame)))
         self._flow.forget()
 
     def _follow_size(self, frame: Frame) -> None:
