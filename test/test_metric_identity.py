@@ -39,6 +39,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     SLICES,
     SUREST_OTHER,
     SUREST_SAME,
+    Compared,
     Gallery,
     Looks,
     View,
@@ -146,6 +147,23 @@ def test_height_speaks_for_the_same_and_against_another():
     assert height_log_odds(1.55, 1.85) < -0.5
     # Somebody may sit down, so that no height alone can refuse him.
     assert height_log_odds(1.1, 1.85) > -4
+
+
+def test_what_one_view_does_not_show_is_as_in_the_others():
+    """Who was seen above a desk has not the trousers of anybody, if they are known."""
+    upper, whole = look(RED, BLUE, rows=0.5), look(DARK_RED, BLUE)
+    looks = Looks.of([upper, whole])
+    for trousers in (BLUE, GREEN):
+        seen = look(RED, trousers)
+        compared = Compared.of(seen, looks)
+        assert compared.similarity() == pytest.approx([alike(seen, v) for v in (upper, whole)])
+        assert compared.similarity()[0] > 0.95
+        assert (compared.of_each([0])[0] > 0.95) == (trousers == BLUE)
+    # Each is compared with what is known of himself alone.
+    both = Compared.of(look(RED, GREEN), Looks.of([upper, whole, look(RED, GREEN)]))
+    assert both.of_each([0, 2]) == pytest.approx([compared.of_each([0])[0], 1.0], abs=1e-4)
+    # Where nothing is known of his trousers, they say nothing.
+    assert Compared.of(look(RED, GREEN), Looks.of([upper])).of_each([0])[0] > 0.95
 
 
 def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
@@ -1163,6 +1181,46 @@ def test_what_is_no_figure_is_not_the_target_for_good_after_an_absence(
         boxes += track[number].box is not None
     assert boxes, 'it is published with its probability'
     assert person.seen_at == seen_at, 'and nothing is learned from it'
+
+
+@pytest.mark.parametrize('step', [0.9, 0.97, 1.0, 1.03, 1.2])
+def test_a_slow_camera_misses_nobody(step: float):
+    """What comes once a second or so is no absence, nor is a frame in which somebody is missed."""
+    targets, against = MetricTargets(MetricParameters()), set()
+    for i in range(1, 9):
+        one = Someone(-0.6 + 0.15 * i, 3.0)
+        frame = picture([] if i == 6 else [one], i * step)
+        if i == 1:
+            person = targets.person(targets.add(frame, one.box))
+            continue
+        targets.update(frame)
+        assert targets.account is not None
+        assert person is not None
+        assert person.seen_at == pytest.approx((4 if i == 6 else i - 1) * step)
+        if i < 6:
+            against.add(round(targets.account.against, 6))
+    assert len(against) == 1, 'nobody counts as one who came back'
+
+
+def test_after_a_pause_nobody_is_the_target_at_once():
+    """However alike: all may have gone and others come; some sightings must bear it out."""
+    targets = MetricTargets(MetricParameters())
+    for i in range(8):
+        one = Someone(-0.4 + 0.05 * i, 3.0)
+        frame = picture([one], 0.1 * i)
+        if i == 0:
+            number = targets.add(frame, one.box)
+        else:
+            targets.update(frame)
+    person = targets.person(number)
+    assert person is not None
+    known = person.seen_at
+    taken = []
+    for i in range(12):
+        targets.update(picture([Someone(0.05 * i, 3.0)], 30.0 + 0.1 * i))
+        taken.append(person.seen_at > known)
+    assert not any(taken[:3])
+    assert taken[-1]
 
 
 def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):

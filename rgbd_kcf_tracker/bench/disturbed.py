@@ -15,18 +15,19 @@ from __future__ import annotations
 import argparse
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.bench.altered import add_folders, make_copy, names_of, write_copies
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
 from rgbd_kcf_tracker.recordings.imagefiles import image_files
-from rgbd_kcf_tracker.recordings.outputs import cannot_write, check_outputs, make_folder
+from rgbd_kcf_tracker.recordings.outputs import cannot_write
 
 STRONGER, TINTED = 0.15, 0.05
 """Deviation of the logarithm of the light, and of that of blue and of red against green."""
@@ -51,10 +52,7 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
     if colors is None or not (folder / 'depth').is_dir():
         raise RecordingError(f'{folder} holds no folders of colour and depth images')
     frames = read_frames(folder, image_files(colors), fps=1.0)
-    if out.exists():
-        raise RecordingError(f'{out} is there already: give another --out')
-    for part in (out, out / colors.name, out / 'depth'):
-        make_folder(part)
+    make_copy(out, colors.name, 'depth')
     for path in folder.iterdir():
         if path.is_file():
             shutil.copyfile(path, out / path.name)
@@ -85,31 +83,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog='python -m rgbd_kcf_tracker.bench.disturbed',
         description=(__doc__ or '').split('\n')[0],
     )
-    parser.add_argument('folders', nargs='+', type=Path, metavar='FOLDER', help='recordings')
-    parser.add_argument('--out', type=Path, required=True, help='folder of the copies')
+    add_folders(parser)
     parser.add_argument('--copies', type=int, default=8, help='of each recording')
     parser.add_argument('--seed', type=int, default=1)
     args = parser.parse_args(argv)
-    names = [folder.resolve().name for folder in args.folders]
     if args.copies < 1 or args.seed < 0:
         parser.error('--copies must be 1 or more, and --seed 0 or more')
-    if len(set(names)) < len(names):
-        parser.error(f'two of {", ".join(names)} have the same name: their copies would, too')
-    try:
-        check_outputs({'--out': args.out}, args.folders, overwrite=True, folders=('--out',))
-        make_folder(args.out)
+    names = names_of(args.folders, parser)
+
+    def copies() -> Iterator[str]:
         for copy in range(1, args.copies + 1):
             for index, (folder, name) in enumerate(zip(args.folders, names, strict=True)):
                 out = args.out / f'{copy}_{name}'
                 rng = np.random.default_rng([args.seed, copy, index])
-                print(f'{out}: {disturb(folder, out, rng)} pairs')
-    except RgbdKcfError as error:
-        print(error, file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f'{args.out} cannot be written: {error.strerror or error}', file=sys.stderr)
-        return 2
-    return 0
+                yield f'{out}: {disturb(folder, out, rng)} pairs'
+
+    return write_copies(args.out, args.folders, copies)
 
 
 if __name__ == '__main__':

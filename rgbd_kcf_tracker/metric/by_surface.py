@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, Account
+from rgbd_kcf_tracker.metric.decide.crowd import SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
@@ -97,6 +97,8 @@ class BySurface:
     Attributes:
         candidates: of the last frame, for looking at what the tracker saw.
         hidden_for: seconds since the target was last seen.
+        was_away: whether it was absent for so long, before the last frame, that its place says
+            little.
     """
 
     def __init__(
@@ -125,6 +127,8 @@ class BySurface:
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
+        self._misses = 0
+        self.was_away = False
         self.candidates: list[Candidate] = []
         self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
         self._learn_around(scene, first, None)
@@ -243,6 +247,7 @@ class BySurface:
         """
         scene = account.scene
         following = self.hidden_for == 0.0
+        self.was_away = absent(self.hidden_for + dt, self._misses)
         if isinstance(scene.motion, Pose):
             self.motion.carried(scene.motion)
             if self._cloud is not None:
@@ -288,9 +293,7 @@ class BySurface:
                 self.candidates.insert(0, more)
         best = self.candidates[0] = self._alone(account, self.candidates)
         parameters = self._parameters
-        if best.probability < (
-            parameters.recognition if self.hidden_for > REUNION else parameters.acceptance
-        ):
+        if best.probability < (parameters.recognition if self.was_away else parameters.acceptance):
             return None
         return best if best.placed.fraction >= parameters.least_visible else None
 
@@ -348,6 +351,7 @@ class BySurface:
             The box of its visible part in pixels of the image.
         """
         self.hidden_for = self._gone = 0.0
+        self._misses = 0
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
         self.body.grow(seen)
@@ -365,6 +369,7 @@ class BySurface:
         if scene is not None and self.hidden_for < LEAVING:
             self._gone = max(self._gone, self._outside(scene))
         self.hidden_for += dt
+        self._misses += 1
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
 
     def seen_elsewhere(self, view: DepthView, box: Box) -> None:
@@ -376,6 +381,7 @@ class BySurface:
         self.motion.correct(place, sigma)
         self._middle.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
+        self._misses = 0
 
     @staticmethod
     def outline(scene: Scene, seen: Silhouette) -> Box:

@@ -14,7 +14,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
-from rgbd_kcf_tracker.metric.decide.crowd import REUNION, SMALL, WHOLE, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
@@ -201,7 +201,7 @@ class Follower:
         found = surface.step(account, frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
-        if surface.hidden_for > REUNION and self.person is not None:
+        if surface.was_away and self.person is not None:
             index = account.sight_of(found.seen)
             stranger = account.stranger(self.person, index)
             # A part of somebody, where all of the target is a figure, tells not for good who it is.

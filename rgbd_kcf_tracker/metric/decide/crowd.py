@@ -20,9 +20,9 @@ from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
     WHOLE_AREA,
+    Compared,
     Looks,
     View,
-    similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
@@ -75,8 +75,11 @@ MOST = 0.5
 SAME_AGAIN = 0.5
 """Log-odds beyond those against coming back, and ahead of anybody else, at which a newcomer is
 somebody who was here before."""
-REUNION = 1.0
-"""Seconds of absence after which somebody who was chosen is recognised by more than his place."""
+REUNION, PAUSE = 1.0, 3.0
+"""Seconds of absence after which somebody who was chosen is recognised by more than his place; and
+the same where hardly a frame was taken meanwhile, as by a slow camera."""
+MISSES = 2
+"""Frames in which somebody was not found that are no chance."""
 RECENT = 0.6
 """Seconds after the last sight for which a figure is parted where somebody is expected."""
 
@@ -149,6 +152,10 @@ class Account:
     def owners(self) -> list[Person]:
         """Whoever a sight of the frame is of."""
         return [self.people[row] for row in self.owner if row >= 0]
+
+    def was_away(self, person: Person) -> bool:
+        """Whether somebody has been absent for so long that his place says little."""
+        return absent(self.time - person.seen_at, person.misses)
 
     def place(self, seen: Silhouette) -> FloatArray:
         """Where a silhouette is, ``(2,)`` metres across and along the floor."""
@@ -302,6 +309,16 @@ class Account:
         return mask
 
 
+def absent(gone: float, misses: int) -> bool:
+    """Whether somebody was away, and not only missed once by a slow camera.
+
+    Args:
+        gone: seconds since he was last seen.
+        misses: frames that have shown nothing of him since.
+    """
+    return gone > (REUNION if misses >= MISSES else PAUSE)
+
+
 class Crowd:
     """Gives everyone who stands before the room an identity and keeps it.
 
@@ -431,7 +448,7 @@ class Crowd:
         account.verdict = _assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
         # borne out over some sightings who he is.
-        missed = [p.chosen and time - p.seen_at > REUNION for p in self.people]
+        missed = [p.chosen and account.was_away(p) for p in self.people]
         account.owner = list(account.verdict)
         if any(missed):
             odds_of_here = np.where(np.array(missed)[:, None], NEW - 1, odds)
@@ -466,7 +483,7 @@ class Crowd:
             if other == row or person.number in newcomer.met:
                 continue
             if person.chosen:
-                missed = account.time - person.seen_at > REUNION
+                missed = account.was_away(person)
             else:
                 missed = person.seen_at < newcomer.first_seen
             if missed:
@@ -485,9 +502,10 @@ class Crowd:
         best: list[list[float]] = []
         if known:
             everyone = self._joined(known)
-            alike = np.stack([similarity(sight.view, everyone) for sight in sights], axis=1)
-            starts = np.cumsum([0] + [len(each) for each in known[:-1]])
-            best = np.maximum.reduceat(alike, starts, axis=0).tolist()
+            compared = [Compared.of(sight.view, everyone) for sight in sights]
+            alike = np.stack([each.similarity() for each in compared], axis=1)
+            starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
+            best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
         rows = iter(best)
         places = np.stack([s.figure.place for s in sights])
         for row, person in enumerate(self.people):
@@ -619,7 +637,7 @@ class Crowd:
         person, scene = account.people[row], account.scene
         place = account.place(seen)
         gone = account.time - person.seen_at
-        if gone > REUNION:
+        if person.misses and gone > REUNION:
             self._arrivals.returned(gone)
         if gone > 0:
             person.moved_to(place, account.time)

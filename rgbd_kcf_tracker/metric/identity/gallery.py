@@ -165,21 +165,66 @@ _DIAGONALS = np.stack([np.eye(LIGHTNESS, k=k).ravel() for k in DIMMER], axis=1).
 _COST = (DIMMER_COST * np.abs(DIMMER)).astype(np.float32)
 
 
-def similarity(view: View, looks: Looks) -> FloatArray:
-    """How alike a view is to each of several, ``(n,)``, 0 to 1; 0 where no slice can be compared.
+@dataclass(frozen=True, slots=True, eq=False)
+class Compared:
+    """A view held against ``n`` others, slice by slice.
 
-    The mean over the slices that show in both, each counting by how much of it shows, how colourful
-    it is and :data:`HEAD_WEIGHT`, at the best of the shifts of lightness.
+    Attributes:
+        weight: ``(n, SLICES)`` float32, how much each slice says: by how much of it shows, how
+            colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both.
+        alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
     """
-    common = np.minimum(looks.area, view.area)
-    weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
-    weight[common < LEAST_SLICE] = 0
-    weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
-    # All levels of one against all of the other; the shifts are the diagonals of that.
-    cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
-    mean = np.einsum('ns,snd->nd', weight, cross) @ _DIAGONALS - _COST
+
+    weight: FloatArray
+    alike: FloatArray
+
+    @classmethod
+    def of(cls, view: View, looks: Looks) -> Compared:
+        """Hold a view against several."""
+        common = np.minimum(looks.area, view.area)
+        weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
+        weight[common < LEAST_SLICE] = 0
+        # All levels of one against all of the other; the shifts are the diagonals of that.
+        cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
+        return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2))
+
+    def similarity(self) -> FloatArray:
+        """How alike the view is to each of the others, ``(n,)``, 0 to 1.
+
+        The mean over the slices that show in both, at the best of the shifts of lightness; 0 where
+        no slice can be compared.
+        """
+        return _best(self.weight, self.alike)
+
+    def of_each(self, starts: Sequence[int]) -> FloatArray:
+        """How alike the view is to each of several people, ``(p,)``, 0 to 1: to his best view.
+
+        What one view of somebody does not show is as in whichever other one of his fits best, in
+        the same light: who showed above a desk has not the trousers of anybody.
+
+        Args:
+            starts: where the views of each begin, those of the first at 0.
+        """
+        most = np.maximum.reduceat(self.weight, starts, axis=0)
+        shows = self.weight > 0
+        best = np.maximum.reduceat(self.alike * shows[..., None], starts, axis=0)
+        whose = np.repeat(np.arange(len(starts)), np.diff([*starts, len(shows)]))
+        weight = np.where(shows, self.weight, most[whose])
+        alike = np.where(shows[..., None], self.alike, best[whose])
+        found: FloatArray = np.maximum.reduceat(_best(weight, alike), starts)
+        return found
+
+
+def _best(weight: FloatArray, alike: FloatArray) -> FloatArray:
+    share = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    mean = (share[:, None, :] @ alike)[:, 0] - _COST
     best: FloatArray = np.maximum(mean.max(axis=1), 0)
     return best
+
+
+def similarity(view: View, looks: Looks) -> FloatArray:
+    """How alike a view is to each of several, see :meth:`Compared.similarity`."""
+    return Compared.of(view, looks).similarity()
 
 
 def look_log_odds(alike: float, area: float, views: int = 1) -> float:
@@ -247,10 +292,10 @@ class Gallery:
 
         Args:
             view: the view.
-            alike: its likeness to the most alike one of the gallery, where that is known.
+            alike: its likeness to the person, see :meth:`Compared.of_each`, where that is known.
         """
         if self.looks is not None and alike is None:
-            alike = float(similarity(view, self.looks).max())
+            alike = float(Compared.of(view, self.looks).of_each([0])[0])
         return self._log_odds(view, alike, len(self.views))
 
     def log_odds_before(self, time: float, view: View, alike: FloatArray) -> float | None:

@@ -59,6 +59,7 @@ class Person:
     Attributes:
         seen_at: seconds, the last sight.
         sightings: how often it was seen.
+        misses: frames since then that showed nothing of it.
         mobile: whether it was seen before a room that is known: what stands still is not it.
         area: square metres, the most that was seen of it.
         entered: whether it was first seen at the edge of what the camera sees.
@@ -76,7 +77,7 @@ class Person:
         self.place, self.velocity = place.copy(), np.zeros(2)
         self.first_place, self.travelled = place.copy(), 0.0
         self.seen_at = self.first_seen = time
-        self.sightings = 1
+        self.sightings, self.misses = 1, 0
         self.upright = self.mobile = self.entered = self.figure = False
         self.hidden = True
         self.met: set[int] = set()
@@ -127,6 +128,7 @@ class Person:
         Args:
             depth: ``(h, w)`` metres, 0 where there is no reading.
         """
+        self.misses += 1
         if self.last is None or not self.hidden:
             self.hidden = False
             return
@@ -162,7 +164,7 @@ class Person:
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""
         self.place, self.velocity = newcomer.place, newcomer.velocity
-        self.seen_at, self.last = newcomer.seen_at, newcomer.last
+        self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
         self.hidden = newcomer.hidden
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
@@ -182,6 +184,7 @@ class Person:
         self.place, other.place = other.place, self.place
         self.velocity, other.velocity = other.velocity, self.velocity
         self.seen_at, other.seen_at = other.seen_at, self.seen_at
+        self.misses, other.misses = other.misses, self.misses
         self.last, other.last = other.last, self.last
         self.hidden, other.hidden = other.hidden, self.hidden
         self.figure, other.figure = other.figure, self.figure
@@ -216,6 +219,7 @@ class Person:
             self.velocity = np.zeros(2)
         self.place = place.copy()
         self.seen_at, self.hidden = time, True
+        self.misses = 0
         self.sightings += 1
         self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
 

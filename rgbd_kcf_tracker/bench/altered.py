@@ -1,0 +1,65 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the commands that write altered copies of recordings have in common."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
+
+
+def add_folders(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say what is copied, and where to."""
+    parser.add_argument('folders', nargs='+', type=Path, metavar='FOLDER', help='recordings')
+    parser.add_argument('--out', type=Path, required=True, help='folder of the copies')
+
+
+def names_of(folders: Iterable[Path], parser: argparse.ArgumentParser) -> list[str]:
+    """What the copies are named after; ends the command where two are the same."""
+    names = [folder.resolve().name for folder in folders]
+    if len(set(names)) < len(names):
+        parser.error(f'two of {", ".join(names)} have the same name: their copies would, too')
+    return names
+
+
+def write_copies(out: Path, folders: list[Path], write: Callable[[], Iterable[str]]) -> int:
+    """Write copies, saying of each what it is.
+
+    Args:
+        out: folder of the copies.
+        folders: what is copied, in none of which anything is written.
+        write: writes one copy after the other, and gives a line for each.
+
+    Returns:
+        The exit status: 2 where one cannot be made.
+    """
+    try:
+        check_outputs({'--out': out}, folders, overwrite=True, folders=('--out',))
+        make_folder(out)
+        for line in write():
+            print(line)
+    except RgbdKcfError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f'{out} cannot be written: {error.strerror or error}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def make_copy(out: Path, *parts: str) -> None:
+    """Make the folders of a copy, which must not be there.
+
+    Raises:
+        RgbdKcfError: where it is, or they cannot be made.
+    """
+    if out.exists():
+        raise RecordingError(f'{out} is there already: give another --out')
+    for part in (out, *(out / name for name in parts)):
+        make_folder(part)
