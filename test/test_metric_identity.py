@@ -1223,6 +1223,23 @@ def test_after_a_pause_nobody_is_the_target_at_once():
     assert taken[-1]
 
 
+@pytest.mark.parametrize(('pause', 'found'), [(0.1, True), (30.0, False)])
+def test_what_looks_like_the_target_where_depth_is_blind_is_it_unless_it_was_away(
+    pause: float, found: bool
+):
+    one = Someone(0.0, 3.0)
+    tracker = create_tracker('metric')
+    for i in range(8):
+        frame = picture([one], 0.1 * i)
+        tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    for i in range(4):
+        frame = picture([one], 0.7 + pause + 0.1 * i)
+        blind = frame.depth.copy()
+        blind[:, int(one.box.x) - 6 : int(one.box.right) + 6] = np.nan
+        track = tracker.update(dataclasses.replace(frame, depth=blind))
+        assert (track.box is not None) == found
+
+
 def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
     """What follows from a step is a take, a miss, or a place told by the look: one of them."""
     calls: list[str] = []

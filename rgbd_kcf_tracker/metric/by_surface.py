@@ -331,6 +331,7 @@ class BySurface:
 
     def drift(self, dt: float) -> None:
         """Go on by ``dt`` seconds without a picture of depth."""
+        self.was_away = absent(self.hidden_for + dt, self._misses)
         self.motion.predict(dt)
         self._middle.predict(dt)
 

@@ -276,7 +276,9 @@ class Follower:
         if self._look is not None and view is not None:
             box = surface.expected_box(view)
             blind = scene is None or surface.without_depth(scene) > BLIND
-            if blind and box is not None and box.clipped(frame.width, frame.height) is not None:
+            # Who was away need not be where he was expected: what is like him may be anything.
+            near = blind and not surface.was_away
+            if near and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
                 if look is not None and not self._stood_there(account, look.box):
                     surface.seen_elsewhere(view, look.box)
