@@ -258,11 +258,11 @@ def _gallery(seen: _Seen) -> Picture:
         'The gallery holds a few views of the target, of when it surely was seen and showed '
         'something new; of each the body is cut into slices of '
         f'{100 * gallery.SLICE:.0f} cm, and each keeps how often every colour shows in it; drawn '
-        'is the mean. A candidate is compared with all views, slice by slice, and the most alike '
-        'one says how likely it is the same person (the cue "look"; everybody else in view has a '
-        'gallery too).',
+        'is the mean. A candidate is compared with all views, slice by slice (what a view does not '
+        'show is taken from the others), and the most alike one says how likely it is the same '
+        'person (the cue "look"; everybody else in view has a gallery too).',
         r's = \max_v \sum_k a_k \sum_u \sqrt{p_{k,u}\ q^v_{k,u}}',
-        (*map(name_of, COMPUTED_BY['gallery']), name_of(gallery.similarity)),
+        (*map(name_of, COMPUTED_BY['gallery']), name_of(gallery.Compared.of_each)),
         plot_style.png(figure), {'colors': stripes},
         signs(
             (
