@@ -204,8 +204,10 @@ class Follower:
         if surface.was_away and self.person is not None:
             index = account.sight_of(found.seen)
             stranger = account.stranger(self.person, index)
-            # A part of somebody, where all of the target is a figure, tells not for good who it is.
-            new = account.owner[index] < 0 if index >= 0 else self.person.figure
+            # A part of somebody, where all of the target is a figure, tells not for good who it is;
+            # but a thing that was in view until the camera paused is hardly another one.
+            part = self.person.figure and surface.hidden_for > 0
+            new = account.owner[index] < 0 if index >= 0 else part
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
