@@ -281,17 +281,18 @@ def test_everyone_may_be_asked_for_later_and_keeps_the_ids_when_the_run_goes_on(
     assert 'use metric' in rig.ask('everyone', value=True)['word']
 
 
-def test_everyone_asked_for_where_the_target_touches_another_are_two() -> None:
+@pytest.mark.parametrize('frame', [28, 29, 30])
+def test_everyone_asked_for_where_the_target_touches_another_are_two(frame: int) -> None:
     """Chosen anew in that very frame, the target was taken for both, and they for one."""
     rig = Rig(scene=crowd(), everyone=False)
-    (alone,) = rig.ask('seek', frame=30)['targets']
+    (alone,) = rig.ask('seek', frame=frame)['targets']
     seen = rig.ask('everyone', value=True)
     (target,) = (t for t in seen['targets'] if t['chosen'])
     assert Box(*target['box']).iou(Box(*alone['box'])) > 0.9
     others = [t['id'] for t in seen['targets'] if not t['chosen'] and t['box']]
     assert others
     for count, other in enumerate(others, 2):
-        seen = rig.ask('follow', id=other, frame=30)
+        seen = rig.ask('follow', id=other, frame=frame)
         assert sum(t['chosen'] for t in seen['targets']) == count
 
 
