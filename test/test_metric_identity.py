@@ -1155,29 +1155,33 @@ def test_a_look_is_not_taken_where_depth_shows_the_room():
         assert (track.box is not None) == (i < 13)
 
 
-def test_what_is_no_figure_is_not_the_target_for_good_after_an_absence(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def followed() -> tuple[MetricTargets, int, Person]:
+    """A set that has followed somebody for eight tenths of a second, the target's id, and who."""
     targets = MetricTargets(MetricParameters())
-    one = Someone(-0.3, 3.0)
-    targets.update(picture([], 0.0))
     for i in range(8):
-        last = 0.1 * (i + 1)
-        frame = picture([dataclasses.replace(one, x=-0.3 + 0.05 * i)], last)
+        one = Someone(-0.3 + 0.05 * i, 3.0)
+        frame = picture([one], 0.1 * (i + 1))
         if i == 0:
             number = targets.add(frame, one.box)
         else:
             targets.update(frame)
     person = targets.person(number)
     assert person is not None
-    seen_at = person.seen_at
+    return targets, number, person
+
+
+def test_what_is_no_figure_is_not_the_target_for_good_after_an_absence(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    targets, number, person = followed()
+    last, seen_at = 0.8, person.seen_at
     for i in range(6):
         targets.update(picture([], last + 0.5 * (i + 1)))
     # As where a desk leaves a piece of him that is too small for a figure.
     monkeypatch.setattr(Account, 'sight_of', lambda *_: -1)
     boxes = 0
     for i in range(5):
-        track = targets.update(picture([dataclasses.replace(one, x=0.4)], last + 3.1 + 0.1 * i))
+        track = targets.update(picture([Someone(0.4, 3.0)], last + 3.1 + 0.1 * i))
         boxes += track[number].box is not None
     assert boxes, 'it is published with its probability'
     assert person.seen_at == seen_at, 'and nothing is learned from it'
@@ -1204,18 +1208,8 @@ def test_a_slow_camera_misses_nobody(step: float):
 
 def test_after_a_pause_nobody_is_the_target_at_once():
     """However alike: all may have gone and others come; some sightings must bear it out."""
-    targets = MetricTargets(MetricParameters())
-    for i in range(8):
-        one = Someone(-0.4 + 0.05 * i, 3.0)
-        frame = picture([one], 0.1 * i)
-        if i == 0:
-            number = targets.add(frame, one.box)
-        else:
-            targets.update(frame)
-    person = targets.person(number)
-    assert person is not None
-    known = person.seen_at
-    taken = []
+    targets, _, person = followed()
+    known, taken = person.seen_at, []
     for i in range(12):
         targets.update(picture([Someone(0.05 * i, 3.0)], 30.0 + 0.1 * i))
         taken.append(person.seen_at > known)

@@ -127,8 +127,7 @@ class BySurface:
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
-        self._misses = 0
-        self.was_away = False
+        self._misses, self.was_away = 0, False
         self.candidates: list[Candidate] = []
         self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
         self._learn_around(scene, first, None)

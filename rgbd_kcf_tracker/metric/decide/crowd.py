@@ -637,6 +637,7 @@ class Crowd:
         person, scene = account.people[row], account.scene
         place = account.place(seen)
         gone = account.time - person.seen_at
+        # Who was missed only once may have been away, too: how surely, the time says.
         if person.misses and gone > REUNION:
             self._arrivals.returned(gone)
         if gone > 0:
