@@ -63,5 +63,30 @@ def test_nothing_is_written_over_and_what_has_no_depth_is_said(
     (recording / 'depth').rmdir()
     assert paused.main([str(recording), '--out', str(tmp_path / 'other')]) == 2
     assert 'holds no depth images' in capsys.readouterr().err
-    with pytest.raises(SystemExit):
-        paused.main([*line, '--keep', '0'])
+    for wrong in (['--keep', '0'], ['--fps', 'inf'], ['--fps', 'nan'], ['--seconds', '-1']):
+        with pytest.raises(SystemExit):
+            paused.main([*line, *wrong])
+
+
+def test_what_no_copy_can_be_made_of_is_said(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    """It ended with nothing written and status 0, and without truth in a traceback."""
+    out = ['--out', str(tmp_path / 'out')]
+    assert paused.main([str(recording), '--keep', '500', *out]) == 2
+    assert 'of 12 frames no 500 show somebody' in capsys.readouterr().err
+    (recording / 'mot.txt').unlink()
+    assert paused.main([str(recording), *out]) == 2
+    assert 'does not say who is where: expected mot.txt' in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_depth_is_that_of_the_image_beside_it(recording: Path, tmp_path: Path):
+    cv2.imwrite(str(recording / 'depth' / '000.png'), np.full((40, 60), 9000, np.uint16))
+    for path in (recording / 'depth').glob('??.png'):
+        cv2.imwrite(str(path), np.full((40, 60), 1000 + int(path.stem), np.uint16))
+    out = tmp_path / 'out'
+    assert paused.main([str(recording), '--keep', '3', '--cut', '4', '--out', str(out)]) == 0
+    copied = sorted((out / '000_room' / 'depth').iterdir())
+    millimetres = [int(cv2.imread(str(p), cv2.IMREAD_UNCHANGED)[0, 0]) for p in copied]
+    assert millimetres == [1000 + n for n in (0, 1, 2, 7, 8, 9, 10, 11)]

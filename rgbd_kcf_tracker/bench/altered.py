@@ -14,10 +14,19 @@ from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
 
 
-def add_folders(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that say what is copied, and where to."""
+def parser_of(command: str, doc: str | None) -> argparse.ArgumentParser:
+    """The parser of a command, with the arguments that say what is copied, and where to.
+
+    Args:
+        command: name of its module.
+        doc: the module's docstring, of which the first line describes it.
+    """
+    parser = argparse.ArgumentParser(
+        prog=f'python -m rgbd_kcf_tracker.bench.{command}', description=(doc or '').split('\n')[0]
+    )
     parser.add_argument('folders', nargs='+', type=Path, metavar='FOLDER', help='recordings')
     parser.add_argument('--out', type=Path, required=True, help='folder of the copies')
+    return parser
 
 
 def names_of(folders: Iterable[Path], parser: argparse.ArgumentParser) -> list[str]:
@@ -41,7 +50,6 @@ def write_copies(out: Path, folders: list[Path], write: Callable[[], Iterable[st
     """
     try:
         check_outputs({'--out': out}, folders, overwrite=True, folders=('--out',))
-        make_folder(out)
         for line in write():
             print(line)
     except RgbdKcfError as error:
@@ -54,12 +62,12 @@ def write_copies(out: Path, folders: list[Path], write: Callable[[], Iterable[st
 
 
 def make_copy(out: Path, *parts: str) -> None:
-    """Make the folders of a copy, which must not be there.
+    """Make the folders of a copy, which must not be there, and the one that it lies in.
 
     Raises:
         RgbdKcfError: where it is, or they cannot be made.
     """
     if out.exists():
         raise RecordingError(f'{out} is there already: give another --out')
-    for part in (out, *(out / name for name in parts)):
+    for part in (out.parent, out, *(out / name for name in parts)):
         make_folder(part)

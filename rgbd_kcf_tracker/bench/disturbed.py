@@ -12,7 +12,6 @@ once more. The truth stays as it is. A tracker that has understood a recording f
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
@@ -22,7 +21,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.bench.altered import add_folders, make_copy, names_of, write_copies
+from rgbd_kcf_tracker.bench.altered import make_copy, names_of, parser_of, write_copies
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
@@ -79,11 +78,7 @@ def _write(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) ->
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the copies; status 2 where one cannot be made."""
-    parser = argparse.ArgumentParser(
-        prog='python -m rgbd_kcf_tracker.bench.disturbed',
-        description=(__doc__ or '').split('\n')[0],
-    )
-    add_folders(parser)
+    parser = parser_of('disturbed', __doc__)
     parser.add_argument('--copies', type=int, default=8, help='of each recording')
     parser.add_argument('--seed', type=int, default=1)
     args = parser.parse_args(argv)

@@ -34,7 +34,7 @@ from rgbd_kcf_tracker.evaluation.datasets.folder import (
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, with_truth
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.imagefiles import image_files
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, image_files
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 
@@ -70,7 +70,21 @@ def find(path: Path, fps: float) -> list[Sequence]:
 
 
 def load(path: Path, fps: float) -> Opened:
-    """Open a recording with everyone in it.
+    """Open a recording with everyone in it; see :func:`read`."""
+    frames, people = read(path, fps)
+
+    def samples() -> Iterator[Sample]:
+        nobody = [None] * len(frames)
+        for number, sample in enumerate(with_truth(frames, nobody)):
+            present = tuple(people.get(number, ()))
+            yield dataclasses.replace(sample, people=present, number=number)
+
+    known = any(p.body is not None for present in people.values() for p in present)
+    return Opened(samples(), len(frames), total=len(frames), has_body=known)
+
+
+def read(path: Path, fps: float) -> tuple[ImageFrames, People]:
+    """The frames of a recording, none of them decoded yet, and who is in them.
 
     Raises:
         DatasetError: where nobody is in it, or lines and images differ in number.
@@ -81,6 +95,11 @@ def load(path: Path, fps: float) -> Opened:
         raise DatasetError(f'{path} holds no images in {", ".join(IMAGE_FOLDERS)}')
     images = image_files(folder)
     truth = _truth_files(path)
+    if not truth:
+        raise DatasetError(
+            f'{path} does not say who is where: expected {MOT_FILE}, {_CHALLENGE} or '
+            'groundtruth_PERSON.txt for each'
+        )
     together = truth[0].name in (MOT_FILE, _CHALLENGE.name)
     if together:
         people = _from_mot(truth[0], path, images, folder)
@@ -88,16 +107,7 @@ def load(path: Path, fps: float) -> Opened:
         people = _from_files(truth, images, folder)
     if not people:
         raise DatasetError(f'{truth[0]}: nobody is ever in view: nothing to measure against')
-    frames = read_frames(path, images, _challenge_rate(path) or fps)
-
-    def samples() -> Iterator[Sample]:
-        nobody = [None] * len(images)
-        for number, sample in enumerate(with_truth(frames, nobody)):
-            present = tuple(people.get(number, ()))
-            yield dataclasses.replace(sample, people=present, number=number)
-
-    known = any(p.body is not None for present in people.values() for p in present)
-    return Opened(samples(), len(images), total=len(images), has_body=known)
+    return read_frames(path, images, _challenge_rate(path) or fps), people
 
 
 def _from_mot(path: Path, beside: Path, images: tuple[Path, ...], folder: Path) -> People:
