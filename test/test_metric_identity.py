@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
+from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
     MOST_VIEWS,
@@ -58,6 +59,7 @@ from rgbd_kcf_tracker.metric.perceive.upright import person_sized
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
+from rgbd_kcf_tracker.track import Track
 
 # -- looks ----------------------------------------------------------------------------------------
 
@@ -186,6 +188,18 @@ def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
     assert gallery.views[0] is first
     assert gallery.looks is not None
     assert len(gallery.looks) == MOST_VIEWS
+
+
+def test_a_copy_of_a_gallery_learns_for_itself():
+    gallery = Gallery()
+    gallery.learn(look(RED), 0.0)
+    gallery.learn_height(1.7, 0.0)
+    same = gallery.copy()
+    gallery.learn(look(GREEN), 1.0)
+    gallery.learn_height(1.9, 1.0)
+    assert (len(same.views), same.top) == (1, 1.7)
+    assert (len(gallery.views), gallery.top) == (2, pytest.approx(1.8))
+    assert same.log_odds(look(GREEN)) < gallery.log_odds(look(GREEN))
 
 
 def test_the_height_of_a_gallery_is_a_median_of_the_newest():
@@ -375,6 +389,48 @@ def test_odds_against_it_make_a_probability_less_and_leave_what_is_sure():
     assert bounded(0.9, 0.0) == pytest.approx(0.9)
     assert bounded(1.0, 5.0) == 1.0
     assert bounded(0.0, 5.0) == 0.0
+
+
+# -- who came back --------------------------------------------------------------------------------
+
+
+def returned(*views: View) -> tuple[Person, Comeback]:
+    """Somebody known by some views, who is back after ten seconds."""
+    person = Person(1, np.zeros(2), 0.0, chosen=True)
+    for view in views:
+        person.gallery.learn(view, 0.0)
+    person.met.add(7)
+    return person, Comeback(person, 10.0)
+
+
+def test_a_return_is_as_likely_as_its_looks_say_by_what_was_known_before():
+    red, green = look(RED), look(GREEN)
+    person, comeback = returned(red)
+    assert (comeback.left, comeback.since, comeback.met) == (0.0, 10.0, {7})
+    odds = person.gallery.log_odds(red)
+    assert comeback.hear(red, {}, 10.0) == pytest.approx(1 / (1 + np.exp(-odds)))
+    assert comeback.borne_out == (odds > BORNE_OUT)
+    # What is learned of him since does not bear it out, nor does that he goes on to look the same.
+    person.gallery.learn(green, 11.0)
+    for i in range(20):
+        last = comeback.hear(green, {}, 12.0 + 0.1 * i)
+    assert last < 0.5
+    assert not comeback.borne_out
+    assert comeback.known.log_odds(green) < 0 < person.gallery.log_odds(green)
+
+
+def test_who_came_back_is_less_likely_the_target_beside_another_who_is_as_like_it():
+    red, green = look(RED), look(GREEN)
+    _, alone = returned(red)
+    _, beside = returned(red)
+    odds = alone.known.log_odds(red)
+    alone.hear(red, {2: green}, 10.0)
+    assert alone.hear(red, {2: green}, 10.1) == pytest.approx(1 / (1 + np.exp(-odds)))
+    # Both may be it, or neither.
+    expected = np.exp(odds) / (1 + 2 * np.exp(odds))
+    assert beside.hear(red, {2: red}, 10.0) == pytest.approx(expected)
+    # Of one who has left nothing more is heard.
+    assert beside.hear(red, {}, 10.1) == pytest.approx(1 / (1 + np.exp(-odds)))
 
 
 # -- everyone together ----------------------------------------------------------------------------
@@ -1215,6 +1271,65 @@ def test_after_a_pause_nobody_is_the_target_at_once():
         taken.append(person.seen_at > known)
     assert not any(taken[:3])
     assert taken[-1]
+
+
+def back_again(*shown: tuple[list[Someone], Box | None]) -> list[Track]:
+    """Tracks of a target in red and black that was away for five seconds, ten frames a second."""
+    targets, number, _ = followed()
+    for i in range(10):
+        targets.update(picture([], 1.3 + 0.5 * i))
+    return [
+        targets.update(picture(people, 6.3 + 0.1 * i, board))[number]
+        for i, (people, board) in enumerate(shown)
+    ]
+
+
+DESK = Box(0, 95, COLS, ROWS - 95)
+"""It hides the legs of whoever stands behind it."""
+
+
+@pytest.mark.parametrize('trousers', [BLACK, GREEN])
+def test_the_score_of_who_came_back_falls_when_more_of_him_shows_that_is_not_the_targets(
+    trousers: tuple[int, int, int],
+):
+    """Where he was a moment ago, and what was learned of him since, do not bear him out."""
+    came = [Someone(-0.8 + 0.03 * i, 2.6, RED, trousers) for i in range(26)]
+    tracks = back_again(*(([one], DESK if i < 14 else None) for i, one in enumerate(came)))
+    assert tracks[13].score > 0.9, 'all that shows of him is the same'
+    assert tracks[-1].box is not None
+    assert tracks[-1].box.iou(came[-1].box) > 0.9
+    assert (tracks[-1].score > 0.9) == (trousers == BLACK)
+
+
+def test_who_came_back_is_somebody_else_once_the_target_shows():
+    shown = []
+    for i in range(40):
+        people = [Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)]
+        if i >= 26:
+            people.append(Someone(0.9 - 0.02 * (i - 26), 3.4))
+        shown.append((people, DESK if i < 14 else None))
+    tracks = back_again(*shown)
+    for (people, _), track in list(zip(shown, tracks, strict=True))[30:34]:
+        assert track.box is not None
+        assert track.box.iou(people[1].box) > 0.8
+
+
+def test_what_was_learned_of_a_return_that_is_not_borne_out_is_taken_back():
+    targets, number, person = followed()
+    known = list(person.gallery.views)
+    for i in range(10):
+        targets.update(picture([], 1.3 + 0.5 * i))
+    for i in range(26):
+        one = Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)
+        targets.update(picture([one], 6.3 + 0.1 * i, DESK if i < 14 else None))
+    assert len(person.gallery.views) > len(known)
+    for i in range(4):
+        targets.update(picture([], 9.5 + 0.5 * i))
+    # With nobody in view nothing is asked; it is when somebody else comes in.
+    targets.update(picture([Someone(0.0, 3.0, BLUE, GREY)], 12.0))
+    assert targets.person(number) is person
+    assert len(person.gallery.views) == len(known)
+    assert all(mine is his for mine, his in zip(person.gallery.views, known, strict=True))
 
 
 @pytest.mark.parametrize(('pause', 'found'), [(0.1, True), (30.0, False)])

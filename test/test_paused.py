@@ -49,6 +49,24 @@ def test_a_copy_leaves_frames_out_and_time_goes_on(recording: Path, tmp_path: Pa
     assert [s.people[0].counts for s in samples] == [True, False, True, True, True, True]
 
 
+def test_frames_from_anywhere_else_follow_and_time_goes_on(recording: Path, tmp_path: Path):
+    out = tmp_path / 'out'
+    line = [str(recording), '--fps', '5', '--keep', '3', '--cut', '1', '--step', '4', '--anywhere']
+    assert paused.main([*line, '--seconds', '20', '--out', str(out)]) == 0
+    # Each of three stretches that show somebody before each of the others.
+    pairs = ['000_004', '000_008', '004_000', '004_008', '008_000', '008_004']
+    assert sorted(path.name for path in out.iterdir()) == [f'{pair}_room' for pair in pairs]
+    (copy,) = open_dataset(str(out / '004_000_room'), DatasetOptions(everyone=True))
+    samples = list(copy.open().samples)
+    kept = [4, 5, 6, 0, 1, 2]
+    assert [int(s.frame.color[0, 0, 0]) for s in samples] == [10 * n for n in kept]
+    seconds = np.diff([s.frame.stamp_ns for s in samples]) * 1e-9
+    assert seconds == pytest.approx([0.2, 0.2, 20.0, 0.2, 0.2])
+    assert [[p.id for p in s.people] for s in samples] == [[1], [1], [1], [], [], [1]]
+    tight = [*line, '--cut', '7', '--out', str(tmp_path / 'none')]
+    assert paused.main(tight) == 2, 'no two stretches are so far apart'
+
+
 def test_nothing_is_written_over_and_what_has_no_depth_is_said(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

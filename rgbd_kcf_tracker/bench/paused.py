@@ -8,11 +8,13 @@
 writes ``paused/000_filinha``, ``paused/006_filinha`` and so on: each begins some frames later,
 goes on for 12, leaves out 25, and says of what then follows that it was seen 30 seconds later.
 Recordings in which somebody comes back are rare; here all who were seen are away at once, and
-some come back, most do not, and others come in their stead.
+some come back, most do not, and others come in their stead. With ``--anywhere`` what follows are 12
+frames from anywhere else in the recording, earlier ones too: a copy for each pair of beginnings.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import shutil
 import sys
@@ -37,19 +39,24 @@ def pause(
         people: who is in them.
         kept: indices of the frames that the copy has.
         out: is made.
-        shift_ns: nanoseconds by which whatever follows the first frame left out is later.
+        shift_ns: nanoseconds by which whatever follows the first frame left out is later; frames
+            that were earlier come so much after the one before them.
 
     Raises:
         RgbdKcfError: where it is there, or cannot be made.
     """
     make_copy(out, 'rgb', 'depth')
-    stamps, late = [], 0
+    stamps: list[int] = []
+    late = 0
     rows: list[tuple[int, int, tuple[float, ...], float]] = []
     for number, index in enumerate(kept):
         for source, part in ((frames.colors[index], 'rgb'), (frames.depths[index], 'depth')):
             assert source is not None
             shutil.copyfile(source, out / part / f'{number + 1:06d}{source.suffix}')
-        late = shift_ns if number and index > kept[number - 1] + 1 else late
+        if number and index > kept[number - 1] + 1:
+            late = shift_ns
+        elif number and index < kept[number - 1]:
+            late = stamps[-1] + shift_ns - frames.stamps_ns[index]
         stamps.append(frames.stamps_ns[index] + late)
         for person in people.get(index, ()):
             rows.append((number, person.id, person.box.as_tuple(), float(person.counts)))
@@ -61,6 +68,18 @@ def pause(
             shutil.copyfile(beside, out / name)
 
 
+def _stretches(start: int, count: int, args: argparse.Namespace) -> Iterator[tuple[str, list[int]]]:
+    """The frames before a pause, from ``start`` on, with those after it, and what to call them."""
+    keep, after = args.keep, args.keep + args.cut
+    before = range(start, start + keep)
+    if not args.anywhere:
+        yield f'{start:03d}', [*before, *range(start + after, count)]
+        return
+    for then in range(0, count - keep + 1, args.step):
+        if then + after <= start or then >= start + after:
+            yield f'{start:03d}_{then:03d}', [*before, *range(then, then + keep)]
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the copies; status 2 where one cannot be made."""
     parser = parser_of('paused', __doc__)
@@ -68,6 +87,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--keep', type=int, default=12, help='frames before the pause')
     parser.add_argument('--cut', type=int, default=25, help='frames left out')
     parser.add_argument('--step', type=int, default=6, help='frames from one beginning to the next')
+    parser.add_argument(
+        '--anywhere', action='store_true', help='frames from anywhere else follow, earlier ones too'
+    )
     parser.add_argument('--seconds', type=float, default=30.0, help='of pause')
     args = parser.parse_args(argv)
     if not (0 < args.fps < math.inf and 0 <= args.seconds < 1e6):
@@ -82,19 +104,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             if not frames.depths:
                 raise RecordingError(f'{folder} holds no depth images: nobody is known there')
             after = args.keep + args.cut
-            starts = [
-                start
-                for start in range(0, len(frames) - after, args.step)
+            last = len(frames) - (args.keep - 1 if args.anywhere else after)
+            stretches = {
+                called: kept
+                for start in range(0, last, args.step)
                 if any(p.counts for n in range(args.keep) for p in people.get(start + n, ()))
-            ]
-            if not starts:
+                for called, kept in _stretches(start, len(frames), args)
+            }
+            if not stretches:
                 raise RecordingError(
                     f'{folder}: of {len(frames)} frames no {args.keep} show somebody and leave '
                     f'more than {args.cut} after them: give a smaller --keep, --cut or --step'
                 )
-            for start in starts:
-                kept = [*range(start, start + args.keep), *range(start + after, len(frames))]
-                out = args.out / f'{start:03d}_{name}'
+            for called, kept in stretches.items():
+                out = args.out / f'{called}_{name}'
                 pause(frames, people, kept, out, int(args.seconds * 1e9))
                 yield f'{out}: {len(kept)} pairs'
 

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.crowd import SMALL, Account, absent
+from rgbd_kcf_tracker.metric.decide.crowd import MISSES, SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
@@ -241,8 +241,8 @@ class BySurface:
 
         Returns:
             What is most likely the target, or None where nothing is. What follows from it is only
-            taken in by :meth:`take`, :meth:`seen_elsewhere` or :meth:`miss`, one of which must be
-            called.
+            taken in by :meth:`take`, :meth:`seen_elsewhere`, :meth:`miss` or :meth:`disown`, one of
+            which must be called.
         """
         scene = account.scene
         following = self.hidden_for == 0.0
@@ -343,6 +343,10 @@ class BySurface:
             np.full(3, self._parameters.acceleration),
         )
         self._middle.forget()
+
+    def disown(self, gone: float) -> None:
+        """Who was followed is somebody else: the target has been away for ``gone`` seconds."""
+        self.hidden_for, self._misses = gone, MISSES
 
     def take(self, scene: Scene, found: Candidate) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.

@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
@@ -48,6 +49,8 @@ RELOCK_FRAMES = 3
 RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 """Sightings of a returning target, and seconds of them, after which it is the target for good, and
 the mean log-odds of its look that it takes."""
+DISOWNED = 0.25
+"""Probability that who came back is the target, below which he is somebody else after all."""
 STANDING = 0.6
 """Share of a box's middle that shows the room from which it is taken to be no more than that."""
 NEWCOMER = 1.5
@@ -115,6 +118,7 @@ class Follower:
         self._about: frozenset[int] = frozenset()
         self._ends: Sides | None = None
         self._elsewhere = Elsewhere()
+        self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
         self.response: float | None = None
@@ -199,6 +203,8 @@ class Follower:
             surface.drift(dt)
             return self._glance(frame, None, view, dt, surface)
         found = surface.step(account, frame, dt)
+        if surface.was_away:
+            self._withdraw()
         if found is None:
             return self._glance(frame, account, view, dt, surface)
         if surface.was_away and self.person is not None:
@@ -214,22 +220,59 @@ class Follower:
                 score = bounded(found.probability, account.against * away(surface.hidden_for))
                 surface.miss(account.scene, dt)
                 return self._tracked(frame, box, score, found.seen.depth, belief)
+            if self.person.figure and self.person.gallery.views:
+                self._comeback = Comeback(self.person, account.time)
             surface.resume(found)
+        score = found.probability
+        if self._comeback is not None:
+            believed = self._believed(self._comeback, account, found.seen)
+            if believed < DISOWNED:
+                self._disown(self._comeback, account.time, surface)
+                return self._hidden(frame, dt)
+            score *= believed
         whole = self._whole(account, found.seen)
         if whole is not None:
             self._start_over(account, whole)
             box = outline_box(account.scene, whole)
-            return self._tracked(frame, box, found.probability, whole.depth, self._belief())
+            return self._tracked(frame, box, score, whole.depth, self._belief())
         box = surface.take(account.scene, found)
         self.seen = found.seen
         outline = BySurface.outline(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
-        if self.person is not None and found.probability >= SURE:
+        if self.person is not None and score >= SURE:
             for cue in self._cues:
                 cue.learn(frame, box, self.person.number)
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
-        return self._tracked(frame, box, found.probability, found.seen.depth, surface.belief())
+        return self._tracked(frame, box, score, found.seen.depth, surface.belief())
+
+    def _believed(self, comeback: Comeback, account: Account, seen: Silhouette) -> float:
+        """Probability that a returned target is the target, by what was known before it left."""
+        assert self.person is not None
+        mine = account.sight_of(seen)
+        others = {
+            account.people[owner].number: account.sights[index].view
+            for index, owner in enumerate(account.owner)
+            if owner >= 0
+            and index != mine
+            and account.people[owner] is not self.person
+            and account.people[owner].number not in comeback.met
+        }
+        return comeback.hear(account.look(seen), others, account.time)
+
+    def _withdraw(self) -> None:
+        """What was learned of a return that was not borne out is not of the target."""
+        if self._comeback is not None and self.person is not None and not self._comeback.borne_out:
+            self.person.gallery = self._comeback.known
+        self._comeback = None
+
+    def _disown(self, comeback: Comeback, time: float, surface: BySurface) -> None:
+        """Who came back is somebody else: the target is still away."""
+        assert self.person is not None
+        self._crowd.disown(self.person, comeback)
+        self._hidden_for = time - comeback.left
+        surface.disown(self._hidden_for)
+        self._comeback = None
 
     def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:
         """All of somebody of whom something hid a part when he was chosen, as soon as it shows."""

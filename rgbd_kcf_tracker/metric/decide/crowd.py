@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrivals, away
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
+from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
     WHOLE_AREA,
@@ -619,6 +620,20 @@ class Crowd:
             for other, there in seen_now:
                 if np.hypot(*(place - there)) > BESIDE:
                     person.met.add(other.number)
+
+    def disown(self, person: Person, comeback: Comeback) -> None:
+        """Who was taken for somebody since a return gets a number of his own."""
+        other = self.welcome(person.place, comeback.since)
+        person.exchange(other, comeback.since)
+        person.gallery = comeback.known
+        person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
+        beside = person.met - comeback.met
+        person.met = set(comeback.met)
+        other.met |= beside
+        for each in self.people:
+            if each.number in beside:
+                each.met.discard(person.number)
+                each.met.add(other.number)
 
     def _merge(self, account: Account, row: int, other: int) -> None:
         """Drop the number under which a target was known while it was not recognised."""

@@ -342,6 +342,13 @@ class Gallery:
             self.learn(view, time)
         self._set_tops(sorted(self._tops + other._tops))
 
+    def copy(self) -> Gallery:
+        """The same views and heights; what either learns from now on is its own."""
+        same = Gallery()
+        same._set_views(list(self.views), list(self._learned))
+        same._set_tops(list(self._tops))
+        return same
+
     def taken_back(self, since: float) -> Gallery:
         """Take back what was learned from ``since`` on, in seconds: it was of somebody else."""
         late = Gallery()

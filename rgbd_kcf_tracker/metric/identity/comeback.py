@@ -1,0 +1,74 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Is who came back really the target? Held against what was known of it before it went.
+
+Who is followed is where he was a moment ago, and what is learned of him is like him, whoever he is:
+neither bears out who he is. Only his looks by the views from before the absence do, and so does
+that nobody else in view has them more.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, View
+from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.tally import Tally
+
+BORNE_OUT = 2.0
+"""Log-odds from which what was learned since the return is of the target and stays."""
+
+
+class Comeback:
+    """One return of a target, which may be somebody else.
+
+    Args:
+        person: the target, as it was known before.
+        time: seconds of the return.
+
+    Attributes:
+        since: seconds of the return.
+        left: seconds of the last sight before it.
+        known: the views and heights from before.
+        met: numbers of those who had been seen beside the target.
+    """
+
+    def __init__(self, person: Person, time: float) -> None:
+        self.since, self.left = time, person.seen_at
+        self.known, self.met = person.gallery.copy(), frozenset(person.met)
+        self._mine, self._others = Tally(), dict[int, Tally]()
+
+    def hear(self, view: View, others: dict[int, View], time: float) -> float:
+        """Take a frame, and give the probability that who came back is the target, 0 to 1.
+
+        Args:
+            view: of who came back.
+            others: of all in view who may be the target as well, by their numbers.
+            time: seconds.
+        """
+        self._take(self._mine, view, time)
+        for number, other in others.items():
+            self._take(self._others.setdefault(number, Tally()), other, time)
+        mine = math.exp(self.odds)
+        rivals = (self._others[number].mean or 0.0 for number in others)
+        # Each may be the target, or none of them.
+        return mine / (1.0 + mine + sum(math.exp(odds) for odds in rivals if odds > 0))
+
+    def _take(self, tally: Tally, view: View, time: float) -> None:
+        shows = min(1.0, view.total / WHOLE_AREA) ** 2
+        tally.add(self.known.log_odds(view), shows, time)
+
+    @property
+    def odds(self) -> float:
+        """Log-odds that who came back is the target, by his looks alone, of late.
+
+        That many sightings say the same says little more: that two people wear the same does not
+        change from frame to frame.
+        """
+        return self._mine.mean or 0.0
+
+    @property
+    def borne_out(self) -> bool:
+        """Whether his looks say that he is the target."""
+        return self.odds > BORNE_OUT
