@@ -11,6 +11,7 @@ that nobody else in view has them more.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 
 from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, View
 from rgbd_kcf_tracker.metric.identity.person import Person
@@ -18,6 +19,16 @@ from rgbd_kcf_tracker.metric.identity.tally import Tally
 
 BORNE_OUT = 2.0
 """Log-odds from which what was learned since the return is of the target and stays."""
+AGAIN = 0.15
+"""Seconds after which somebody is looked at again: nobody looks otherwise before."""
+
+
+@dataclass
+class _Heard:
+    """What was heard of one, and when last, in seconds."""
+
+    tally: Tally = field(default_factory=Tally)
+    time: float = -math.inf
 
 
 class Comeback:
@@ -37,27 +48,34 @@ class Comeback:
     def __init__(self, person: Person, time: float) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
-        self._mine, self._others = Tally(), dict[int, Tally]()
+        self._mine, self._others = _Heard(), dict[int, _Heard]()
 
     def hear(self, view: View, others: dict[int, View], time: float) -> float:
         """Take a frame, and give the probability that who came back is the target, 0 to 1.
 
         Args:
             view: of who came back.
-            others: of all in view who may be the target as well, by their numbers.
+            others: of all in view who may be the target as well, by their numbers. Of these one is
+                looked at in each frame, who was looked at longest ago.
             time: seconds.
         """
-        self._take(self._mine, view, time)
-        for number, other in others.items():
-            self._take(self._others.setdefault(number, Tally()), other, time)
+        self._look(self._mine, view, time)
+        for number in others:
+            self._others.setdefault(number, _Heard())
+        if others:
+            number = min(others, key=lambda each: self._others[each].time)
+            self._look(self._others[number], others[number], time)
         mine = math.exp(self.odds)
-        rivals = (self._others[number].mean or 0.0 for number in others)
+        rivals = (self._others[number].tally.mean or 0.0 for number in others)
         # Each may be the target, or none of them.
         return mine / (1.0 + mine + sum(math.exp(odds) for odds in rivals if odds > 0))
 
-    def _take(self, tally: Tally, view: View, time: float) -> None:
+    def _look(self, heard: _Heard, view: View, time: float) -> None:
+        if time - heard.time < AGAIN:
+            return
         shows = min(1.0, view.total / WHOLE_AREA) ** 2
-        tally.add(self.known.log_odds(view), shows, time)
+        heard.tally.add(self.known.log_odds(view), shows, time)
+        heard.time = time
 
     @property
     def odds(self) -> float:
@@ -66,7 +84,7 @@ class Comeback:
         That many sightings say the same says little more: that two people wear the same does not
         change from frame to frame.
         """
-        return self._mine.mean or 0.0
+        return self._mine.tally.mean or 0.0
 
     @property
     def borne_out(self) -> bool:
