@@ -113,8 +113,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             }
             if not stretches:
                 raise RecordingError(
-                    f'{folder}: of {len(frames)} frames no {args.keep} show somebody and leave '
-                    f'more than {args.cut} after them: give a smaller --keep, --cut or --step'
+                    f'{folder}: of {len(frames)} frames no {args.keep} show somebody with '
+                    f'{args.cut} between them and what follows: give a smaller --keep, --cut or '
+                    '--step'
                 )
             for called, kept in stretches.items():
                 out = args.out / f'{called}_{name}'

@@ -20,7 +20,6 @@ from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
-    WHOLE_AREA,
     Compared,
     Looks,
     View,
@@ -479,7 +478,7 @@ class Crowd:
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
         newcomer = account.people[row]
-        shows = min(1.0, account.sights[column].view.total / WHOLE_AREA) ** 2
+        shows = account.sights[column].view.shows ** 2
         for other, person in enumerate(account.people[: len(account.looks)]):
             if other == row or person.number in newcomer.met:
                 continue

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, View
+from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
@@ -129,7 +129,7 @@ class MixUps:
             )
             if odds is None:
                 continue
-            doubt.said.add(-odds, self._counts * _shows(one.view), time)
+            doubt.said.add(-odds, self._counts * one.view.shows, time)
             if found is None and doubt.said.odds(SIGHTINGS) > SOMEBODY_NEW:
                 found = MixUp(one.person, None, doubt.since)
                 del self._returns[number]
@@ -161,11 +161,6 @@ class MixUps:
         return found
 
 
-def _shows(view: View) -> float:
-    """How much shows of a sight, 0 to 1."""
-    return min(1.0, view.total / WHOLE_AREA)
-
-
 def _crosswise(
     one: Followed, other: Followed, alike: Likeness, since: float
 ) -> tuple[float, float] | None:
@@ -183,5 +178,5 @@ def _crosswise(
         if odds is not None and as_taken is not None:
             crossed += odds
             straight += as_taken
-            shows.append(_shows(seen.view))
+            shows.append(seen.view.shows)
     return (min(crossed, crossed - straight), sum(shows) / len(shows)) if shows else None

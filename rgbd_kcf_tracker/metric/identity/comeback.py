@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from rgbd_kcf_tracker.metric.identity.gallery import WHOLE_AREA, View
+from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
@@ -73,8 +73,7 @@ class Comeback:
     def _look(self, heard: _Heard, view: View, time: float) -> None:
         if time - heard.time < AGAIN:
             return
-        shows = min(1.0, view.total / WHOLE_AREA) ** 2
-        heard.tally.add(self.known.log_odds(view), shows, time)
+        heard.tally.add(self.known.log_odds(view), view.shows**2, time)
         heard.time = time
 
     @property

@@ -124,6 +124,11 @@ class View:
         """Square metres that show."""
         return float(self.area.sum())
 
+    @property
+    def shows(self) -> float:
+        """How much of somebody shows, 0 to 1: :data:`WHOLE_AREA` is all."""
+        return min(1.0, self.total / WHOLE_AREA)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Looks:
