@@ -9,7 +9,6 @@ The one place outside the engines that knows their inside: page, pictures and th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +19,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide import evidence
+from rgbd_kcf_tracker.metric.decide.arrivals import bounded
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.perceive.colors import palette
@@ -78,7 +78,7 @@ class Insight:
     """What a tracker knows after a frame.
 
     Attributes:
-        considered: best first.
+        considered: best first, by what the regression says of them.
         particles: ``(n, 3)`` metres in the camera's frame, None where there are none.
         weights: ``(n,)``, of the particles.
         particle_pixels: ``(n, 2)`` middles in pixels of the image, of trackers without metres.
@@ -159,10 +159,14 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
             continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
         cues |= {said.name: said.share for said in candidate.evidence.more}
-        chance = float(candidate.probability)
         alone = min(max(sum(cues.values()), -evidence.SUREST), evidence.SUREST)
-        beside = math.log(chance / (1 - chance)) - alone
+        beside = evidence.logit(candidate.probability) - alone
         cues[evidence.OTHER_PLACES] = beside if beside < LEAST_LOSS else 0.0
+        doubts = {} if considered else follower.doubts
+        cues |= {
+            cue: doubts.get(cue, 0.0) for cue in (evidence.SOMEBODY_NEW, evidence.KNOWN_BEFORE)
+        }
+        chance = bounded(float(candidate.probability), -sum(doubts.values()))
         considered.append(Considered(box, chance, cues, mask))
     cloud = surface._cloud if surface is not None else None
     half = surface.body.height / 2 if surface is not None else 0.0

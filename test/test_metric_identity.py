@@ -28,8 +28,10 @@ from people_rig import (
 )
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
+from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
+from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
@@ -1312,6 +1314,32 @@ def test_who_came_back_is_somebody_else_once_the_target_shows():
     for (people, _), track in list(zip(shown, tracks, strict=True))[30:34]:
         assert track.box is not None
         assert track.box.iou(people[1].box) > 0.8
+
+
+def test_what_lowers_the_score_of_who_came_back_is_among_its_cues():
+    """What was shown of him was his probability before he was held against what was known."""
+    targets, number, _ = followed()
+    for i in range(10):
+        targets.update(picture([], 1.3 + 0.5 * i))
+    said = {evidence.SOMEBODY_NEW: [], evidence.KNOWN_BEFORE: []}
+    for i in range(40):
+        people = [Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)]
+        if i >= 26:
+            people.append(Someone(0.9 - 0.02 * (i - 26), 3.4))
+        track = targets.update(picture(people, 6.3 + 0.1 * i, DESK if i < 14 else None))[number]
+        considered = of_metric(targets, number).considered
+        for one in considered:
+            odds = min(max(sum(one.cues.values()), -evidence.SUREST), evidence.SUREST)
+            assert 1 / (1 + np.exp(-odds)) == pytest.approx(one.probability, abs=1e-3)
+        assert all(one.cues[cue] == 0 for one in considered[1:] for cue in said)
+        if track.box is not None:
+            assert considered[0].probability == pytest.approx(track.score)
+        for cue, values in said.items():
+            values.append(considered[0].cues[cue] if considered else 0.0)
+    new, known = said.values()
+    assert new[0] < 0, 'anybody may come'
+    assert min(known) < -3, 'his trousers are not the ones that were known'
+    assert all(first == 0 or second == 0 for first, second in zip(new, known, strict=True))
 
 
 def test_what_was_learned_of_a_return_that_is_not_borne_out_is_taken_back():

@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import MISSES, SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
-from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, probability
+from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, logit, probability
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import (
     MIXED,
@@ -288,7 +288,7 @@ class BySurface:
         whole = gathered(scene, self.body, first.seen, first.placed, others)
         if whole is not None:
             (more,) = self._weighed(account, frame, [whole], dt, missing)
-            if _logit(more.probability) > _logit(first.probability) - 1.0:
+            if logit(more.probability) > logit(first.probability) - 1.0:
                 self.candidates.insert(0, more)
         best = self.candidates[0] = self._alone(account, self.candidates)
         parameters = self._parameters
@@ -556,8 +556,3 @@ def _misfit(size: float, expected: float, cut: bool, known: bool) -> float:
     if (ratio < 0 and cut) or (ratio > 0 and not known):
         return 0.0
     return -0.5 * (ratio / (SHRUNK if ratio < 0 else GROWN)) ** 2
-
-
-def _logit(p: float) -> float:
-    p = min(max(p, 1e-9), 1 - 1e-9)
-    return float(np.log(p / (1 - p)))

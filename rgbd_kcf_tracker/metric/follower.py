@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
+from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
@@ -92,6 +93,8 @@ class Follower:
     Attributes:
         person: the target as one of the crowd, None while depth says nothing of it.
         seen: its silhouette in the last frame, None where it has none.
+        doubts: log-odds that the first of :meth:`weighed` lost in the last frame to what is asked
+            of it alone, by cue.
         response: the filter's in the last frame against its own recent mean, None where it was not
             asked.
     """
@@ -121,6 +124,7 @@ class Follower:
         self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
+        self.doubts: dict[str, float] = {}
         self.response: float | None = None
         if account is not None:
             self._lock(frame, account, box)
@@ -161,6 +165,7 @@ class Follower:
         """
         self._account = account
         self.seen = None
+        self.doubts = {}
         if account is not None and account.scene.motion is not None:
             self._elsewhere.forget()
         if self._look is not None:
@@ -218,6 +223,7 @@ class Follower:
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
                 score = bounded(found.probability, account.against * away(surface.hidden_for))
+                self._doubt(SOMEBODY_NEW, found, score)
                 surface.miss(account.scene, dt)
                 return self._tracked(frame, box, score, found.seen.depth, belief)
             if self.person.figure and self.person.gallery.views:
@@ -226,10 +232,11 @@ class Follower:
         score = found.probability
         if self._comeback is not None:
             believed = self._believed(self._comeback, account, found.seen)
+            score *= believed
+            self._doubt(KNOWN_BEFORE, found, score)
             if believed < DISOWNED:
                 self._disown(self._comeback, account.time, surface)
                 return self._hidden(frame, dt)
-            score *= believed
         whole = self._whole(account, found.seen)
         if whole is not None:
             self._start_over(account, whole)
@@ -245,6 +252,9 @@ class Follower:
         if self._look is not None and not found.seen.cut.any:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, score, found.seen.depth, surface.belief())
+
+    def _doubt(self, cue: str, found: Candidate, score: float) -> None:
+        self.doubts[cue] = logit(score) - logit(found.probability)
 
     def _believed(self, comeback: Comeback, account: Account, seen: Silhouette) -> float:
         """Probability that a returned target is the target, by what was known before it left."""

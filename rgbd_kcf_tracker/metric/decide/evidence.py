@@ -144,6 +144,11 @@ CUES = (
 
 OTHER_PLACES = 'other places'
 """What the likeliest candidate loses to the others; the regression does not know of them."""
+SOMEBODY_NEW = 'somebody new'
+"""What it loses while it may be somebody who was never seen before."""
+KNOWN_BEFORE = 'known before'
+"""What it loses after an absence to what the target was known by before, see
+:class:`~rgbd_kcf_tracker.metric.identity.comeback.Comeback`."""
 
 CUE_WORDS = {
     'place': 'how far it is from where the target was expected',
@@ -158,11 +163,20 @@ CUE_WORDS = {
     'came from behind': 'it was first seen away from the image edge, so it was here before',
     'to begin with': 'where all other cues say nothing',
     OTHER_PLACES: 'the target is at one place only: what the likeliest loses to the others',
+    SOMEBODY_NEW: 'who comes may be somebody new instead of the target that comes back',
+    KNOWN_BEFORE: 'after an absence: how alike it is, and others in view are, to the target before',
 }
-"""What each of :data:`CUES`, and :data:`OTHER_PLACES`, says."""
+"""What each of :data:`CUES` says, and of those that only the likeliest has."""
+
+
+def logit(probability: float) -> float:
+    """Log-odds of a probability, at most :data:`SUREST` either way."""
+    least = math.exp(-SUREST)
+    odds = math.log(max(probability, least) / max(1.0 - probability, least))
+    return min(max(odds, -SUREST), SUREST)
 
 
 def probability(evidence: Evidence) -> float:
     """Probability that a candidate is the target, 0 to 1."""
-    logit = float(WEIGHTS @ evidence.features()) + sum(said.share for said in evidence.more)
-    return 1.0 / (1.0 + math.exp(-min(max(logit, -SUREST), SUREST)))
+    odds = float(WEIGHTS @ evidence.features()) + sum(said.share for said in evidence.more)
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -SUREST), SUREST)))
