@@ -9,6 +9,7 @@ Who drives here is a few lines that stand for Nav2's Following Server: towards t
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -183,16 +184,24 @@ def test_the_same_with_the_node_over_dds() -> None:
         with running_node(rig):
             info = CameraInfo(header=rig.header(0), width=SIZE[0], height=SIZE[1])
             info.k = [k.fx, 0.0, k.cx, 0.0, k.fy, k.cy, 0.0, 0.0, 1.0]
-            rig.info.publish(info)
             for index in range(len(sequence)):
                 moment = sequence[index]
                 depth = moment.frame.depth
                 assert depth is not None
+                before = len(heard)
                 if index == 0:
                     assert moment.visible is not None
                     rig.send_init(moment.visible)
-                before = len(heard)
-                rig.send_images(3 * index, moment.frame.color, depth)
+                    # Who listens to the pose, and whose camera it is, may be known a picture later.
+                    for again in range(2):
+                        rig.info.publish(info)
+                        rig.send_images(again, moment.frame.color, depth)
+                        with contextlib.suppress(AssertionError):
+                            rig.wait(lambda: len(heard) > 0, timeout=5.0)
+                            break
+                else:
+                    rig.info.publish(info)
+                    rig.send_images(3 * index, moment.frame.color, depth)
                 box = rig.box()
                 ride.note(moment, box)
                 # Seen, or believed to be there: a pose a picture. None comes for long absences.

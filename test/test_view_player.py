@@ -148,7 +148,9 @@ def test_candidates_particles_and_ellipse_are_those_of_the_tracker() -> None:
 def test_cues_add_up_to_the_verdict_also_beside_others() -> None:
     """What the likeliest loses to candidates elsewhere was in the score and not among the cues."""
     lost = 0
-    for seed in (1, 3, 5):
+    for seed in (3, 1, 5):
+        if lost:
+            break
         scene = SimulatedRecording('crowd', seed, 10.0, (480, 270), 10.0)
         start, box = first_box(scene, None)
         tracker = create_tracker('metric')
