@@ -1348,9 +1348,12 @@ def test_what_was_learned_of_a_return_that_is_not_borne_out_is_taken_back():
     for i in range(10):
         targets.update(picture([], 1.3 + 0.5 * i))
     for i in range(26):
-        one = Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)
-        targets.update(picture([one], 6.3 + 0.1 * i, DESK if i < 14 else None))
+        people = [Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)]
+        if i >= 10:
+            people.append(Someone(1.1 - 0.02 * (i - 10), 3.4, BLUE, GREY))
+        targets.update(picture(people, 6.3 + 0.1 * i, DESK if i < 14 else None))
     assert len(person.gallery.views) > len(known)
+    assert person.met, 'the one in blue was seen beside him'
     for i in range(4):
         targets.update(picture([], 9.5 + 0.5 * i))
     # With nobody in view nothing is asked; it is when somebody else comes in.
@@ -1358,6 +1361,9 @@ def test_what_was_learned_of_a_return_that_is_not_borne_out_is_taken_back():
     assert targets.person(number) is person
     assert len(person.gallery.views) == len(known)
     assert all(mine is his for mine, his in zip(person.gallery.views, known, strict=True))
+    # Had it been somebody else, the one in blue may be the target.
+    assert not person.met
+    assert all(person.number not in each.met for each in targets._crowd.people)
 
 
 @pytest.mark.parametrize(('pause', 'found'), [(0.1, True), (30.0, False)])

@@ -273,7 +273,7 @@ class Follower:
     def _withdraw(self) -> None:
         """What was learned of a return that was not borne out is not of the target."""
         if self._comeback is not None and self.person is not None and not self._comeback.borne_out:
-            self.person.gallery = self._comeback.known
+            self._crowd.withdraw(self.person, self._comeback)
         self._comeback = None
 
     def _disown(self, comeback: Comeback, time: float, surface: BySurface) -> None:

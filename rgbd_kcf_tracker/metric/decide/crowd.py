@@ -624,15 +624,18 @@ class Crowd:
         """Who was taken for somebody since a return gets a number of his own."""
         other = self.welcome(person.place, comeback.since)
         person.exchange(other, comeback.since)
-        person.gallery = comeback.known
         person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
-        beside = person.met - comeback.met
-        person.met = set(comeback.met)
-        other.met |= beside
-        for each in self.people:
-            if each.number in beside:
-                each.met.discard(person.number)
-                each.met.add(other.number)
+        for each in self.withdraw(person, comeback):
+            each.met.add(other.number)
+            other.met.add(each.number)
+
+    def withdraw(self, person: Person, comeback: Comeback) -> list[Person]:
+        """Forget what is known of somebody since a return; gives those who were seen beside him."""
+        beside = [each for each in self.people if each.number in person.met - comeback.met]
+        person.gallery, person.met = comeback.known, set(comeback.met)
+        for each in beside:
+            each.met.discard(person.number)
+        return beside
 
     def _merge(self, account: Account, row: int, other: int) -> None:
         """Drop the number under which a target was known while it was not recognised."""
