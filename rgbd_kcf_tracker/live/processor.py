@@ -198,11 +198,11 @@ class Processor:
         )
         self._last = capture, moment.time_ns
         if frame is not None:
-            self._publishers.publish_extras(answer)
             try:
                 session.settle()
             except Exception as error:  # likewise
                 self._fault('internal_errors', f'internal error: {type(error).__name__}: {error}')
+            self._publishers.publish_extras(answer)
 
     def _unseen(self) -> Track:
         """The answer where nothing can be seen: no box, and the target is as it was."""

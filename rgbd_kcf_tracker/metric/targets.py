@@ -57,7 +57,7 @@ class MetricTargets:
     def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
         p = self._parameters = parameters
         self._cues = cues
-        self.everyone = self.puts_off = False
+        self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
         self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin, p.seed)
         self._crowd = Crowd()
@@ -81,8 +81,10 @@ class MetricTargets:
             BoxError: where no whole pixel of the box lies inside the frame.
         """
         require_inside(box, frame)
+        self._learn()
         if self._frame is not frame:
             self._perceive(frame)
+            self._unlearned = True
             self._learn()
         follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
         if self.account is not None and follower.seen is not None:
@@ -108,6 +110,7 @@ class MetricTargets:
         Raises:
             KeyError: where there is none.
         """
+        self._learn()
         follower = self._followers.pop(number)
         if follower.person is not None:
             follower.person.chosen = False
@@ -125,8 +128,9 @@ class MetricTargets:
             )
             for number, follower in self._followers.items()
         }
-        self._learn()
+        self._unlearned = True
         if self.everyone:
+            self._learn()
             tracks.update(self._others(frame))
         if not self.puts_off:
             self.settle()
@@ -134,6 +138,7 @@ class MetricTargets:
 
     def settle(self) -> None:
         """Do what was put off, see :attr:`puts_off`."""
+        self._learn()
         for follower in self._followers.values():
             follower.settle()
 
@@ -166,8 +171,10 @@ class MetricTargets:
         return dt
 
     def _learn(self) -> None:
-        if self.account is None:
+        """Learn from the last frame, once."""
+        if self.account is None or not self._unlearned:
             return
+        self._unlearned = False
         targets = {
             f.person.number: f.seen for f in self._followers.values() if f.person is not None
         }
