@@ -324,6 +324,25 @@ def test_a_target_is_kept_when_the_image_size_changes(depth: bool, surfaces: boo
         assert track.box.iou(_times(left(i).box, factor)) > 0.6
 
 
+@pytest.mark.parametrize('every', [1, 2, 3])
+def test_the_image_size_may_change_while_somebody_is_hidden(every: int):
+    """Where he was last seen is asked for in the pixels of now."""
+    targets, seen, hidden = TargetSet('metric'), [], 0
+    targets.everyone = True
+    for i in range(34):
+        walker = Someone(-1.2 + 0.08 * i, 3.4, RED, BLACK)
+        frame = picture([walker, Someone(0.2, 2.4, GREEN, GREY)], 0.1 * i)
+        if i % (2 * every) >= every:
+            color, depth = frame.color[::2, ::2].copy(), frame.depth[::2, ::2].copy()
+            frame = Frame(color, depth, frame.stamp_ns)
+        tracks = targets.update(frame)
+        seen.append(sum(track.box is not None for track in tracks.values()))
+        hidden += any(person.hidden for person in targets.metric._crowd.people)
+    assert hidden
+    assert min(seen[12:]) == 1
+    assert seen[-1] == 2
+
+
 def _times(box: Box, factor: float) -> Box:
     return Box(box.x * factor, box.y * factor, box.width * factor, box.height * factor)
 

@@ -332,6 +332,7 @@ class Crowd:
         self.time = 0.0
         self._next = 1
         self._frames = 0
+        self._shape = 0, 0
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
         self._known: list[Looks] = []
@@ -410,6 +411,11 @@ class Crowd:
             self._mix_ups = MixUps()
             for person in self.people:
                 person.mobile, person.last = False, None
+        if scene.view.shape != self._shape:
+            # The pixels of a picture of another size are no places in this one.
+            self._shape = scene.view.shape
+            for person in self.people:
+                person.last = None
         if isinstance(scene.motion, Pose):
             for person in self.people:
                 person.carried(scene.motion, scene.ahead)
