@@ -85,7 +85,8 @@ class TargetSet:
         """Follow what is in ``box`` of ``frame``: the last that was given, or the next.
 
         Returns:
-            Its id, which is never given again while the set lives.
+            Its id, which no other gets while the set lives. With ``metric`` an id is somebody's:
+            who is followed already keeps it, and has it again after :meth:`remove`.
 
         Raises:
             BoxError: where no whole pixel of the box lies inside the frame.
@@ -117,10 +118,14 @@ class TargetSet:
         if self._together is not None:
             self._together.remove(number)
             return
-        del self._trackers[number]
+        del self._trackers[number], self._started[number]
 
     def started(self, number: int) -> Track:
-        """The track of the frame in which a target was added."""
+        """The track of the frame in which a target was added.
+
+        Raises:
+            KeyError: where there is none of that id.
+        """
         if self._together is not None:
             return self._together.started(number)
         return self._started[number]

@@ -112,7 +112,8 @@ def letters(mathtext: str) -> set[str]:
 def test_every_cue_of_the_verdict_is_explained() -> None:
     names = {name for name, _ in evidence.CUES}
     of_the_likeliest = {evidence.OTHER_PLACES, evidence.SOMEBODY_NEW, evidence.KNOWN_BEFORE}
-    assert evidence.CUE_WORDS.keys() == names | of_the_likeliest
+    of_things = {evidence.WHERE_IT_STOOD}
+    assert evidence.CUE_WORDS.keys() == names | of_things | of_the_likeliest
 
 
 def test_a_surface_in_perspective_keeps_its_peak(monkeypatch: pytest.MonkeyPatch) -> None:

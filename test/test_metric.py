@@ -357,6 +357,20 @@ def test_the_mug_is_found_again_each_time(shared_data: Path):
 
 
 @pytest.mark.slow
+def test_a_box_that_the_camera_turns_away_from_is_nothing_else(shared_data: Path):
+    """Backwards it is in view for a second. White papers on a worktop were it for four, at 0.99."""
+    folder = shared_data / 'rgbd' / 'redkitchen'
+    camera = Intrinsics(526.5, 526.5, 324, 238)
+    seen = frames_of(folder, 30.0, camera, depth=True)[330::-1]
+    frames = [dataclasses.replace(f, stamp_ns=i * 33_333_333) for i, f in enumerate(seen)]
+    tracker = create_tracker('metric')
+    tracker.start(frames[0], Box(482, 222, 135, 116))
+    tracks = [tracker.update(frame) for frame in frames[1:]]
+    assert all(track.box is not None for track in tracks[:16])
+    assert all(track.box is None for track in tracks[30:])
+
+
+@pytest.mark.slow
 def test_colour_only_as_good_as_the_best_colour_trackers(shared_data: Path):
     precision = []
     for name in ('Couple', 'Crossing', 'Football1'):

@@ -52,9 +52,11 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
+from rgbd_kcf_tracker.metric.identity.stood import CARRIED_OFF, GAIN, Stood
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized
@@ -391,6 +393,53 @@ def test_odds_against_it_make_a_probability_less_and_leave_what_is_sure():
     assert bounded(0.9, 0.0) == pytest.approx(0.9)
     assert bounded(1.0, 5.0) == 1.0
     assert bounded(0.0, 5.0) == 0.0
+
+
+# -- what stood still ---------------------------------------------------------------------------
+
+TURNED = Pose(cv2.Rodrigues(np.array([0.0, 0.3, 0.0]))[0], np.array([0.05, 0.0, 0.0]))
+
+
+def stood(seconds: float = 1.0) -> tuple[Stood, np.ndarray]:
+    """A thing seen two metres ahead for some time, before the camera turned; where it is now."""
+    place, sigma = np.array([0.2, 0.0, 2.0]), np.full(3, 0.05)
+    thing = Stood(place)
+    for _ in range(round(seconds * 10)):
+        thing.seen(place, sigma, 0.1)
+    assert not thing.known, 'a camera that stands sees what moves'
+    thing.carried(None)
+    thing.carried(TURNED)
+    return thing, TURNED.of(place)
+
+
+def test_what_stood_still_is_where_it_stood_when_the_camera_has_turned():
+    sigma = np.full(3, 0.05)
+    thing, here = stood()
+    assert thing.known
+    there = thing.log_odds(here, sigma)
+    beside = thing.log_odds(here + np.array([0.3, 0.0, 0.0]), sigma)
+    elsewhere = thing.log_odds(here + np.array([2.0, 0.0, 0.0]), sigma)
+    assert there == pytest.approx(np.log((1 - CARRIED_OFF) * np.exp(GAIN) + CARRIED_OFF))
+    assert there > beside > 0 > elsewhere
+    assert elsewhere == pytest.approx(np.log(CARRIED_OFF), abs=0.01)
+    # The longer the camera goes on, the less surely.
+    for motion in (TURNED, TURNED.inverse) * 3:
+        thing.carried(motion)
+    off = np.array([1.0, 0.0, 0.0])
+    assert 0 > thing.log_odds(here + off, sigma) > stood()[0].log_odds(here + off, sigma) + 0.5
+
+
+@pytest.mark.parametrize('why', ['too short', 'moved', 'lost', 'somebody'])
+def test_of_what_moves_or_may_have_moved_no_place_is_known(why: str):
+    thing, here = stood(0.3 if why == 'too short' else 1.0)
+    if why == 'moved':
+        thing.seen(here + np.array([1.0, 0.0, 0.0]), np.full(3, 0.05), 0.1)
+    elif why == 'lost':
+        thing.carried(Lost())
+    elif why == 'somebody':
+        thing.moves()
+    assert not thing.known
+    assert thing.log_odds(here, np.full(3, 0.05)) == 0
 
 
 # -- who came back --------------------------------------------------------------------------------

@@ -64,6 +64,13 @@ def test_a_click_that_gives_no_target_says_why(u: float, v: float, words: str) -
         surface_at(frame, u, v)
 
 
+def test_a_click_on_a_piece_of_wall_is_refused() -> None:
+    """It fills no more than a third of the image, and is three metres wide."""
+    frame = blocks((Box(0, 260, 640, 220), 2.0), (Box(0, 0, 200, 260), 3.0))
+    with pytest.raises(BoxError, match=r'3\.3 m wide and 1\.9 m high, a wall'):
+        surface_at(frame, 420, 100)
+
+
 def test_a_click_without_depth_says_what_to_do() -> None:
     with pytest.raises(BoxError, match='give a box instead'):
         surface_at(Frame(np.zeros((480, 640, 3), np.uint8)), 10, 10)

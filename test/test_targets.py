@@ -304,6 +304,36 @@ def test_a_walking_target_has_a_velocity():
     assert track.velocity == pytest.approx((0.2, 0.0, 0.0), abs=0.1)
 
 
+@pytest.mark.parametrize('variant', ['metric', 'kcf'])
+def test_a_target_is_told_as_it_started_until_it_is_removed(variant: str):
+    targets = TargetSet(variant)
+    number = targets.add(both(0), left(0).box)
+    follow(targets, range(1, 8))
+    assert targets.started(number).box == left(0).box
+    targets.remove(number)
+    with pytest.raises(KeyError):
+        targets.started(number)
+
+
+def test_who_comes_back_is_not_told_as_the_target_and_as_somebody_new():
+    """Until it is decided who he is, both had his box, with scores of 0.9."""
+    targets = TargetSet('metric')
+    targets.everyone = True
+    number = targets.add(picture([left(0)], 0.0), left(0).box)
+    for i in range(1, 10):
+        targets.update(picture([left(i)], STEP * i))
+    for i in range(10):
+        targets.update(picture([], 1.0 + 0.5 * i))
+    found = 0
+    for i in range(12):
+        one = Someone(-0.8 + 0.03 * i, 2.6, RED, BLACK)
+        tracks = targets.update(picture([one], 6.0 + STEP * i))
+        boxes = {n: track.box for n, track in tracks.items() if track.box is not None}
+        assert len(boxes) <= 1
+        found += number in boxes
+    assert found > 8
+
+
 # -- another size of image ------------------------------------------------------------------------
 
 

@@ -17,7 +17,14 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import MISSES, SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
-from rgbd_kcf_tracker.metric.decide.evidence import Evidence, Said, logit, probability
+from rgbd_kcf_tracker.metric.decide.evidence import (
+    FADE,
+    WHERE_IT_STOOD,
+    Evidence,
+    Said,
+    logit,
+    probability,
+)
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import (
     MIXED,
@@ -32,6 +39,7 @@ from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.middle import Belief, MiddleFilter
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -55,6 +63,8 @@ OUTSIDE = 0.1
 FIRST_SIGMA = 0.05
 HIDDEN_NOISE = 0.5
 """Process noise of a hidden target's motion against a visible one's."""
+ELSEWHERE = -1.0
+"""Log-odds, by where it stood, below which a look is that of something else."""
 STRIDE = 0.5
 STRIDE_PER_SECOND = 2.0
 SLOWING = np.array([1.0, 0.25, 1.0])
@@ -124,6 +134,7 @@ class BySurface:
         )
         self._middle = MiddleFilter()
         self._middle.seen(scene.view, first, placed, self.body)
+        self._stood, self._dt = Stood(placed.position), 0.0
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
@@ -247,6 +258,10 @@ class BySurface:
         scene = account.scene
         following = self.hidden_for == 0.0
         self.was_away = absent(self.hidden_for + dt, self._misses)
+        self._dt = dt
+        if self._person.figure:
+            self._stood.moves()
+        self._stood.carried(scene.motion)
         if isinstance(scene.motion, Pose):
             self.motion.carried(scene.motion)
             if self._cloud is not None:
@@ -358,6 +373,8 @@ class BySurface:
         self._misses = 0
         seen, placed = found.seen, found.placed
         self.motion.correct(placed.position, placed.sigma)
+        if not seen.cut.any:
+            self._stood.seen(placed.position, placed.sigma, self._dt)
         self.body.grow(seen)
         self._middle.seen(scene.view, seen, placed, self.body)
         since = scene.since
@@ -378,14 +395,22 @@ class BySurface:
 
     def seen_elsewhere(self, view: DepthView, box: Box) -> None:
         """Take a box of the image that was found by other means: it tells all but the depth."""
-        k, z = view.intrinsics, float(self.motion.position[2])
-        x = (box.cx / view.step - k.cx) * z / k.fx
-        y = (box.y / view.step - k.cy) * z / k.fy
-        place, sigma = np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
+        place, sigma = self._at(view, box)
         self.motion.correct(place, sigma)
         self._middle.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
         self._misses = 0
+
+    def may_be_at(self, view: DepthView, box: Box) -> bool:
+        """Whether a target that stands still may be in a box of the image."""
+        return self._stood.log_odds(*self._at(view, box)) > ELSEWHERE
+
+    def _at(self, view: DepthView, box: Box) -> tuple[FloatArray, FloatArray]:
+        """Where the target would be in a box of the image, and how surely, ``(3,)`` metres each."""
+        k, z = view.intrinsics, float(self.motion.position[2])
+        x = (box.cx / view.step - k.cx) * z / k.fx
+        y = (box.y / view.step - k.cy) * z / k.fy
+        return np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
 
     @staticmethod
     def outline(scene: Scene, seen: Silhouette) -> Box:
@@ -451,6 +476,12 @@ class BySurface:
             step = float((away / variance).sum())
         at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
         came_in = self._came_in(account, seen)
+        gone = self.hidden_for + dt
+        if self._stood.known:
+            stood = self._stood.log_odds(placed.position, placed.sigma)
+            # That it is where it was is known of one that is followed.
+            share = 1.0 if stood < 0 else 1.0 - math.exp(-gone / FADE)
+            more = (Said(WHERE_IT_STOOD, stood, share), *more)
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
@@ -458,7 +489,7 @@ class BySurface:
             height=_misfit(
                 seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
             ),
-            gone=self.hidden_for + dt,
+            gone=gone,
             missing=missing,
             inland=0.0 if came_in else self._gone,
             emerged=not came_in,

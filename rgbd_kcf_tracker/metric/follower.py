@@ -36,6 +36,8 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
+EVEN = 0.5
+"""Probability from which a box is shown as the target's alone."""
 SURE = 0.6
 """Score from which a target's look is learned from where it was found."""
 ATTEND = 1.0
@@ -92,7 +94,9 @@ class Follower:
 
     Attributes:
         person: the target as one of the crowd, None while depth says nothing of it.
+        first, track: of the frame in which it was chosen, and of the last.
         seen: its silhouette in the last frame, None where it has none.
+        glimpsed: that of somebody who is rather the target than somebody new, while that is open.
         doubts: log-odds that the first of :meth:`weighed` lost in the last frame to what is asked
             of it alone, by cue.
         response: the filter's in the last frame against its own recent mean, None where it was not
@@ -124,6 +128,7 @@ class Follower:
         self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
+        self.glimpsed: Silhouette | None = None
         self.doubts: dict[str, float] = {}
         self.response: float | None = None
         if account is not None:
@@ -135,7 +140,7 @@ class Follower:
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
         belief = self._belief()
-        self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
+        self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
         """What was weighed in the last frame, best first, and the box each would have given.
@@ -164,7 +169,7 @@ class Follower:
             dt: seconds.
         """
         self._account = account
-        self.seen = None
+        self.seen = self.glimpsed = None
         self.doubts = {}
         if account is not None and account.scene.motion is not None:
             self._elsewhere.forget()
@@ -223,6 +228,7 @@ class Follower:
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
                 score = bounded(found.probability, account.against * away(surface.hidden_for))
+                self.glimpsed = found.seen if score >= EVEN else None
                 self._doubt(SOMEBODY_NEW, found, score)
                 surface.miss(account.scene, dt)
                 return self._tracked(frame, box, score, found.seen.depth, belief)
@@ -335,7 +341,11 @@ class Follower:
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
-                if look is not None and not self._stood_there(account, look.box):
+                if (
+                    look is not None
+                    and surface.may_be_at(view, look.box)
+                    and not self._stood_there(account, look.box)
+                ):
                     surface.seen_elsewhere(view, look.box)
                     return self._tracked(
                         frame, look.box, _score(look), look.depth, surface.belief()

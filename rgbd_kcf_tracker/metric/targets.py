@@ -147,8 +147,8 @@ class MetricTargets:
         return self._followers[number].weighed()
 
     def started(self, number: int) -> Track:
-        """The last track of a target: after :meth:`add`, that of its first frame."""
-        return dataclasses.replace(self._followers[number].track, id=number)
+        """The track of the frame in which a target was added."""
+        return dataclasses.replace(self._followers[number].first, id=number)
 
     def person(self, number: int) -> Person | None:
         """Whom an id belongs to, None where that is not known or forgotten."""
@@ -208,8 +208,15 @@ class MetricTargets:
         if account is None:
             return tracks
         chosen = {f.person.number for f in self._followers.values() if f.person is not None}
+        # Who is followed as a target may to the account still be somebody new.
+        shown = {
+            account.sight_of(seen)
+            for f in self._followers.values()
+            for seen in (f.seen, f.glimpsed)
+            if seen is not None
+        }
         for column, row in enumerate(account.owner):
-            if row < 0:
+            if row < 0 or column in shown:
                 continue
             person = account.people[row]
             if person.number in chosen or not person.alive:

@@ -142,6 +142,9 @@ CUES = (
 )
 """What the regression's inputs are about, by their places in it."""
 
+WHERE_IT_STOOD = 'where it stood'
+"""What the place says of a thing that has always stood still, see
+:class:`~rgbd_kcf_tracker.metric.identity.stood.Stood`."""
 OTHER_PLACES = 'other places'
 """What the likeliest candidate loses to the others; the regression does not know of them."""
 SOMEBODY_NEW = 'somebody new'
@@ -162,6 +165,7 @@ CUE_WORDS = {
     'left the image': 'the target left at the edge of the image, but this did not come in there',
     'came from behind': 'it was first seen away from the image edge, so it was here before',
     'to begin with': 'where all other cues say nothing',
+    WHERE_IT_STOOD: 'a thing that stood still is there again when the camera looks back',
     OTHER_PLACES: 'the target is at one place only: what the likeliest loses to the others',
     SOMEBODY_NEW: 'who comes may be somebody new instead of the target that comes back',
     KNOWN_BEFORE: 'after an absence: how alike it is, and others in view are, to the target before',

@@ -26,6 +26,8 @@ BAND_M, BAND_SHARE = 0.25, 0.05
 JUMP_M, JUMP_SHARE = 0.03, 0.02
 FLOOR_MARGIN_M = 0.04
 LARGEST_SHARE = 0.6
+LARGEST_M = 2.5
+"""Metres of the widest and tallest that is followed: nobody is as tall, and walls are larger."""
 REACH = 3
 """Rows up and down over which a surface's slope is measured."""
 LEVEL_SHARE = 0.4
@@ -44,7 +46,7 @@ def surface_at(frame: Frame, u: float, v: float) -> Box:
 
     Raises:
         BoxError: where the pixel is outside the image, has no depth, or belongs to a surface that
-            is a speck or fills the image.
+            is a speck, fills the image, or is as large as a wall.
     """
     if not (math.isfinite(u) and math.isfinite(v)) or not (
         0 <= u < frame.width and 0 <= v < frame.height
@@ -77,6 +79,13 @@ def surface_at(frame: Frame, u: float, v: float) -> Box:
     if box.area > LARGEST_SHARE * frame.width * frame.height:
         raise BoxError(
             f'the surface at point {u:g},{v:g} fills the image: point at the target, or give a box'
+        )
+    k = view.intrinsics
+    wide, tall = box.width * depth / (k.fx * view.step), box.height * depth / (k.fy * view.step)
+    if max(wide, tall) > LARGEST_M:
+        raise BoxError(
+            f'the surface at point {u:g},{v:g} is {wide:.1f} m wide and {tall:.1f} m high, a wall '
+            'or the like: point at the target, or give a box'
         )
     return box
 
