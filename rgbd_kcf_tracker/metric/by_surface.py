@@ -49,7 +49,8 @@ from rgbd_kcf_tracker.pose import Pose
 FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
-"""Overlap of the given box with a surface's from which the surface is taken for the target."""
+"""Overlap of the given box with a surface's from which the surface is taken for the target: from
+which a box counts as right in the benchmarks, too (PASCAL VOC)."""
 PART_IOU, INSIDE = 0.35, 0.9
 """The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
 LEAST_FILL = 0.5
@@ -59,27 +60,39 @@ SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
 piece that lies in the box from which it is the target's; and metres between the target's readings,
 arms and a far reading's noise included."""
 OUTSIDE = 0.1
-"""Share of the given box by which a silhouette may stick out of it."""
+"""Share of the given box by which a silhouette may stick out of it on each side: boxes are drawn no
+better by hand, and outlines in depth lie beside those in colour. What is farther out is somebody
+else who touches the target, or what it stands on."""
 FIRST_SIGMA = 0.05
+"""Metres by which the first place is unsure: the target was shown, so it is no more than the body's
+own relief near the camera, which is :data:`~.identity.body.DEPTH_SIGMA`."""
 HIDDEN_NOISE = 0.5
 """Process noise of a hidden target's motion against a visible one's."""
 ELSEWHERE = -1.0
 """Log-odds, by where it stood, below which a look is that of something else."""
 STRIDE = 0.5
 STRIDE_PER_SECOND = 2.0
+"""Metres, and metres a second, that a target may also have moved at will, against what its motion
+tells: a step to either side, and a brisk walk in any direction (people mostly walk at 1.4 m/s)."""
 SLOWING = np.array([1.0, 0.25, 1.0])
+"""Seconds, across, down and ahead, in which the velocity of a target that is not found falls to a
+third: it may stop or turn, and up and down nobody goes on for long, as for the particles
+(:data:`~.identity.hidden_cloud.TURN_TIME`)."""
 GROWN, SHRUNK = 0.3, 0.35
 """Spread of the log size of a body about what is known of it."""
 PLACED_MIDDLE = 0.4
+"""Share of the body's height from its upper end down to where the camera must see past a particle:
+the belly, which is broad and which a table hides less often than legs."""
 LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from."""
 STANDING = 0.5
 """Share of a candidate that is somebody else's, or stood there while the target was elsewhere, from
-which it is not the target."""
+which it is not the target: the greater part of it, for everybody touches something or somebody."""
 SOMEBODY_ELSE = 3.0
 """Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
 APART = 0.5
-"""Distance between two candidates, in widths of the body, from which they are not parts of one."""
+"""Distance between two candidates, in widths of the body, from which they are not parts of one.
+Two who stand side by side are a width apart, and halves of one body half a width."""
 LEAVING = 0.5
 """Seconds after the last sight in which a target is seen to leave the image."""
 

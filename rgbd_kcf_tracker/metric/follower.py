@@ -39,29 +39,40 @@ from rgbd_kcf_tracker.track import Track, TrackState
 EVEN = 0.5
 """Probability from which a box is shown as the target's alone."""
 SURE = 0.6
-"""Score from which a target's look is learned from where it was found."""
+"""Score from which a target's look is learned from where it was found: below, it may well be
+somebody else, who would be the target from then on."""
 ATTEND = 1.0
-"""Seconds after which the look of a target followed by its surface is learned again."""
+"""Seconds after which the look of a target followed by its surface is learned again: it is needed
+only where depth fails, and learning it takes time."""
 BLIND = 0.25
-"""Share of the expected body without a reading from which depth says nothing of it."""
+"""Share of the expected body without a reading from which depth says nothing of it: what is covered
+has the readings of what covers it, and only sun, glass and distance leave this much without."""
 SUREST_LOOK = 0.9
 """Score of a box found by look at full response: on colour alone about nine of ten are right."""
 RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
-"""Overlap of what the look finds with a surface, and for how long, to go over to the surface."""
+"""Overlap of what the look finds with a surface, and in how many frames on end, to go over to the
+surface. At 0.35 a mug in a hand became the person (docs/metric.md)."""
 RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 """Sightings of a returning target, and seconds of them, after which it is the target for good, and
-the mean log-odds of its look that it takes."""
+the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz half a second, as
+sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the disturbed copies
+(docs/metric.md)."""
 DISOWNED = 0.25
-"""Probability that who came back is the target, below which he is somebody else after all."""
+"""Probability that who came back is the target, below which he is somebody else after all: 3 to 1,
+as he was taken once already, on more than this."""
 STANDING = 0.6
-"""Share of a box's middle that shows the room from which it is taken to be no more than that."""
+"""Share of a box's middle that shows the room from which it is taken to be no more than that: of a
+thin target's box up to half shows what is behind."""
 NEWCOMER = 1.5
-"""Seconds after the last look at a target without a surface in which somebody new may be it."""
+"""Seconds after the last look at a target without a surface in which somebody new may be it: the
+next frame at 1 Hz, late ones as well; afterwards anybody may have come."""
 NEWCOMER_AREA = 0.1
-"""Square metres of him, at the least."""
+"""Square metres of him, at the least: a head and shoulders; less is a piece of anything."""
 COVERED = 0.6
-"""Share of a newcomer's outline that lies in the target's box, at the least."""
+"""Share of a newcomer's outline that lies in the target's box, at the least: more than half, so
+that it is not he who stands beside it, but not all, as he may have moved on by a part of his
+width."""
 WALK, WALKED = 1.4, 0.5
 """Metres a second by which that box reaches farther to both sides once the look is lost, and for
 how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
@@ -70,15 +81,20 @@ LIKELY = 0.6
 which were never seen."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
-it is a part of, and how much larger that is at the least."""
+it is a part of, and how much larger that is at the least: half as large again may be an arm, or
+somebody who touches it."""
 TALL, TALLER = 0.9, 1.2
-"""Metres of height of an upright part of somebody, and of somebody."""
+"""Metres of height of an upright part of somebody, half of him seen past a corner, and of somebody:
+no chair's back reaches as high as the latter."""
 READ = 0.5
-"""Share of a box's middle that has depth from which depth tells what is there."""
+"""Share of a box's middle that has depth from which depth tells what is there: half, since what has
+no reading may be the target."""
 OUTLINED = 0.5
-"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it."""
+"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it: from
+which a box counts as right (PASCAL VOC)."""
 NEW_SCORE = 0.8
-"""Score of a box when the target has just been found to be a newcomer."""
+"""Score of a box when the target has just been found to be a newcomer: place and colours fit, but
+nothing has borne it out yet."""
 
 
 class Follower:

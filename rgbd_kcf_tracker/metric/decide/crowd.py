@@ -37,51 +37,67 @@ from rgbd_kcf_tracker.pose import Pose
 FloatArray = npt.NDArray[np.float64]
 
 NEW = 0.0
-"""Log-odds of being somebody known from which a figure is not somebody new."""
+"""Log-odds of being somebody known from which a figure is not somebody new: even ones, as both are
+weighed in what they are made of already."""
 SURE = 1.0
 """Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
 among these the likeliest is enough, for who is known by few views is hardly recognised."""
 WHOLE = 0.2
-"""Square metres of a figure from which its view is learned."""
+"""Square metres of a figure from which its view is learned: about a head and a chest. Of less so
+few of the slices show that others have them as well."""
 HEADED = 1.45
 """Metres above the floor of a figure's upper end from which its head shows, even where the image
 or something nearer begins there."""
 NEW_AREA = 0.12
-"""Square metres of a figure from which it is somebody new."""
+"""Square metres of a figure from which it is somebody new: a head and shoulders, twice the least
+that is a figure, for arms and legs that come apart from somebody are no people."""
 SMALL = 0.1
-"""Square metres of a thing up to which it may be part of somebody's figure."""
+"""Square metres of a thing up to which it may be part of somebody's figure: what fits in the hands
+or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
 STEP, STEP_PER_SECOND = 0.3, 1.0
-"""Metres in depth by which somebody's pixels differ, and may have moved on from one sight to the
-next."""
+"""Metres in depth by which somebody's pixels differ, about an arm's reach, and metres a second
+that they may have moved on since the last sight: a walk."""
 PART_OF_ROOM = 0.3
-"""Share of a silhouette that shows the room up to which it stands before it."""
+"""Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
+with what is behind, and feet lie as near to the floor as its depth is uncertain."""
 BESIDE = 0.5
-"""Metres between two who are surely two, and not a person and a piece of the same."""
+"""Metres between two who are surely two, and not a person and a piece of the same: about a
+shoulder's breadth, as no piece of somebody lies farther from his middle."""
 STRIP = 0.15
 """Metres of a figure beside the part of it that was chosen from which that is somebody else, where
 it is taller than any limb: boxes are not drawn as narrow."""
 NEW_SCORE = 0.5
-"""Score of somebody who has just come into view."""
+"""Score of somebody who has just come into view: nothing is known of him to hold him against, and
+even odds claim nothing."""
 MOST_PEOPLE = 48
-"""People who are remembered beside the chosen ones; who was seen longest ago is forgotten."""
+"""People who are remembered beside the chosen ones; who was seen longest ago is forgotten. It
+bounds time and memory, and is more than come by in most rooms."""
 SETTLED = 3
-"""Frames after which the room is known."""
+"""Frames after which the room is known: as many as tell that a pixel has no reading
+(:data:`~.perceive.room.BLIND_FRAMES`), so that before it anything may seem to be new."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
 SAME = 0.8
-"""Share of a figure's area from which a silhouette that is part of it looks as it does."""
+"""Share of a figure's area from which a silhouette that is part of it looks as it does: hardly a
+slice of it is missing then, and its look is not computed again."""
 MOST = 0.5
-"""Share of a silhouette's pixels from which it is taken to be the same as a figure."""
+"""Share of a silhouette's pixels from which it is taken to be the same as a figure, and of the
+figure's area: more than half, so that it is never the same as two."""
 SAME_AGAIN = 0.5
 """Log-odds beyond those against coming back, and ahead of anybody else, at which a newcomer is
-somebody who was here before."""
+somebody who was here before. With those against it they are seven to one, as for
+:data:`~.mix_ups.MIXED_UP`."""
 REUNION, PAUSE = 1.0, 3.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place; and
-the same where hardly a frame was taken meanwhile, as by a slow camera."""
+the same where hardly a frame was taken meanwhile, as by a slow camera. Within a second a walker
+goes on as before; and a camera that gives 0.9 images a second instead of one is not to find
+everybody away, as it did at 0.97."""
 MISSES = 2
-"""Frames in which somebody was not found that are no chance."""
+"""Frames in which somebody was not found that are no chance: one may be blurred, or lost on the
+way."""
 RECENT = 0.6
-"""Seconds after the last sight for which a figure is parted where somebody is expected."""
+"""Seconds after the last sight for which a figure is parted where somebody is expected: some frames
+at 5 Hz. By then a walker may be a metre from there, and who is not there is not to cut another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

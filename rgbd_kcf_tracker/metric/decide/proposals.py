@@ -25,7 +25,11 @@ from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_PIXELS = 12
+"""Pixels of the view of a proposed surface, at the least: of fewer, three by four, neither outline
+nor colours tell anything."""
 LEAST_SHARE = 0.06
+"""Area of a proposed surface against the target's, at the least: about a head against all of a
+person, which is what shows of somebody behind a cupboard."""
 MOST_SHARE = 3.0
 """Area of a proposed surface against the target's."""
 TOO_LARGE = 1.7

@@ -23,6 +23,9 @@ Image = npt.NDArray[np.uint8]
 FRAME = 1 / 30
 """Seconds to which the learning rates refer."""
 MAX_RATE = 0.15
+"""Share of a new sample at the most, however long ago the last was: at the default rate from 0.27
+seconds on. One picture, which may show a turned or half hidden target, is not to be most of what is
+known."""
 COLOR_RATE = 2.0
 """How much faster than the filter the colours are learned."""
 MEAN_TIME = 0.7
@@ -30,6 +33,9 @@ MEAN_TIME = 0.7
 FIRST_PEAK = 0.6
 """What later peaks are of the first, which is that of the very sample just learned."""
 MIN_MASK = 0.2
+"""Share of the box that looks like the target, at the least, for the filter to be held to these
+pixels: a body fills more of its box, so below this its colours are those around it, and the whole
+box is taken."""
 
 
 @dataclass(frozen=True, slots=True)

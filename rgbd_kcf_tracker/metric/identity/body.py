@@ -35,14 +35,24 @@ COLOR_TIME = 1.0
 """Seconds in which the colours follow."""
 ANCHOR = 0.03
 ANCHOR_PER_METRE = 0.01
+"""Metres, and metres for each of depth, by which the side of an outline that is not cut off is
+unsure: hair and folds of clothes, and two pixels of the view, each half a centimetre at a metre."""
 FILLED = 0.4
 """Share of its outline that a body fills; of one that fills less, readings are missing."""
 WOBBLE = 0.06
 """Metres by which limbs move the outline of a body about its place."""
 DEPTH_SIGMA = 0.05
 DEPTH_SIGMA_PER_METRE = 0.02
+"""Metres, and metres for each of depth, by which the median depth of a silhouette differs from the
+body's: half a chest is 0.11 m deep, and which part of it shows changes as somebody turns. That is
+far more than the readings' noise, on purpose: what looks for the target may be wide, but is not to
+miss it. Where it is says :mod:`.middle`."""
 ODDS_FLOOR = 1e-3
+"""Share of pixels that is added to that of each colour, half of what all colours alike would have:
+a colour that was never seen says nothing."""
 ODDS_LIMIT = 3.0
+"""Log-odds (20 to 1) that the colour of one pixel says at the most: neighbours have the same colour
+and say it again."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,7 +24,12 @@ Spectrum = npt.NDArray[np.complex64]
 PENALTY = 5.0
 PENALTY_GROWTH = 3.0
 PENALTY_MAX = 20.0
+"""Weight of the constraint in the solver's first round, by how much it grows from round to round,
+and the most that it becomes: those of Lukezic et al. (CVPR 2017, section 3.2) and of their
+program."""
 SPARSITY = 0.01
+"""Weight of the filter's own size against its fit, that of the same paper; it keeps what the window
+does not tell small."""
 
 
 def spectrum_of(features: Features) -> Spectrum:

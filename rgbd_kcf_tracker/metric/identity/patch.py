@@ -15,8 +15,14 @@ Image = npt.NDArray[np.uint8]
 Features = npt.NDArray[np.float32]
 
 COLOR_WEIGHT = 0.4
+"""Most that a colour channel can be: as much as one of the orientations, which are half the sum of
+four values cut off at 0.2, so that colour and shape count alike."""
 CHROMA_SLOPE = 0.05
+"""Of the tanh over chroma, for each of its 8-bit levels from grey. Twenty levels are three quarters
+of the most that it gives: clothes have little tint, and a vivid one is not to outweigh all else."""
 COLOR_CHANNELS = 5
+"""Lightness, and two for each axis of chroma: a filter's channel tells how much there is of a
+colour, so that the two ends of an axis, as red and green, need one each."""
 
 
 class PatchFeatures:

@@ -17,20 +17,25 @@ from rgbd_kcf_tracker.pose import Pose
 FloatArray = npt.NDArray[np.float64]
 
 PLACE_SIGMA = 0.18
-"""Metres by which the middle of a silhouette differs from the person's place."""
+"""Metres by which the middle of a silhouette differs from the person's place: half a chest in
+depth, and to the side half of what an arm or a half hidden body moves it."""
 WALKING = 0.8
-"""Metres a second by which a person's next place is unknown."""
+"""Metres a second by which a person's next place is unknown: about half of a walk (1.4 m/s), as who
+walks may stop, and who stands may go. Chosen with the real people at 1 Hz among others
+(docs/metric.md)."""
 STEADY = 0.7
 """Share of that for one who has been followed for some frames and was just seen."""
 COAST = 1.2
-"""Seconds for which a person goes on as before."""
+"""Seconds for which a person goes on as before: from one frame to the next at 1 Hz, and a little
+more, as cameras are late. At 0.6 of that second places fell short of where walkers were."""
 SLOW, STANDS, SWAYING = 0.25, 0.7, 0.4
 """Metres a second below which a person stands, the probability that he goes on standing, and metres
 a second by which his next place is unknown if he does."""
 VELOCITY_TIME = 0.3
 """Seconds after which a velocity is two thirds of what the sightings since then tell."""
 RECENT = 1.5
-"""Seconds between two sightings that tell a velocity."""
+"""Seconds between two sightings that tell a velocity: successive ones at 1 Hz, late ones as well;
+in more of them somebody has turned."""
 ROOM_AREA = 16.0
 """Square metres of floor that a camera sees: a stranger may be anywhere in it."""
 FASTEST, MISPLACED = 3.0, 0.8

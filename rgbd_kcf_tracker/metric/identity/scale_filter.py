@@ -19,9 +19,16 @@ from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.features.windows import sampled
 
 STEP = 1.02
+"""Factor between two sizes, as in the paper: finer ones cannot be told apart."""
 COUNT = 17
+"""Sizes, half of the paper's 33 and half of the time: up to 17 % larger or smaller from one frame
+to the next, which covers at 10 Hz who comes at 1.5 m/s and is farther than 1.1 m."""
 AREA = 512.0
+"""Pixels to which the target is brought for each size, as in the program of the paper's authors:
+the outline is what tells the size, and it shows there."""
 REGULARIZATION = 0.01
+"""Added to the energy of all samples, as in the paper: the filter is not to answer to frequencies
+that hardly occur."""
 
 
 class ScaleFilter:

@@ -31,12 +31,18 @@ CHANGED_SHARE = 0.06
 the camera may have moved; sensor noise stays below, and so does one person walking."""
 CORNERS = 90
 CORNER_QUALITY, CORNER_DISTANCE = 0.01, 6
+"""Corners at the most, their strength against the strongest one's at the least (Shi and Tomasi,
+CVPR 1994), and pixels of the view between two. A motion has six unknowns and each corner gives two
+equations, so ninety are plenty even where half are on somebody; the distance spreads them over the
+view, as one poster would not tell a turn from a step aside."""
 LEAST_CORNERS = 12
 LEAST_AGREEING = 0.4
 """Corners that must agree on a motion for it to be believed, and their share of all."""
 AGREE = 1.5
 """Pixels of the view within which a corner agrees."""
 ITERATIONS = 8
+"""Rounds of fitting. In the first four the pixels within which a corner counts fall from 4 to 0.7,
+so that those on somebody who walks come to count little; four more at that settle the motion."""
 STILL, LEAST_STILL = 0.3, 0.35
 """Pixels of flow up to which a corner stands still, and the share of them from which the camera
 does: somebody may have stepped before the others."""

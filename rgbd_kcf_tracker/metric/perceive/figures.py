@@ -27,6 +27,8 @@ Mask = npt.NDArray[np.bool_]
 JUMP, JUMP_PER_METRE = 0.06, 0.04
 """Depth step between two figures: limbs stand off the trunk farther than one surface may step."""
 LEAST_PIXELS = 12
+"""Pixels of the view, three by four, below which a piece is noise, too: beyond some 3.6 m these are
+more than :data:`LEAST_PIECE`."""
 LEAST_PIECE = 0.004
 """Square metres below which a piece is noise."""
 LEAST_AREA = 0.06

@@ -30,7 +30,13 @@ MIN_SHARE = 0.06
 BELOW = -2.5
 """Elevation, in units of the readings' noise, from which something lies below the floor."""
 TRIALS = 96
+"""Planes through three readings that are tried: where a third of the readings are of the floor, all
+three of one of them are with a probability of 97 %. Where none is found it is tried again some
+frames later."""
 SAMPLES = 600
+"""Readings, of the lower two thirds of the view, on which planes are judged: the share of those on
+a floor that just passes, :data:`MIN_SHARE`, is then known to one in a hundred. All of them would
+cost some forty times as much."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,8 +24,15 @@ NEAREST = 0.02
 BAND_M, BAND_SHARE = 0.25, 0.05
 """Half the depth a surface may span round the pixel: an arm's length, and the sensor's noise."""
 JUMP_M, JUMP_SHARE = 0.03, 0.02
+"""Metres, and share of depth, by which depth jumps between two surfaces. Less than in the view of
+all (0.04 and 0.03), whose pixels lie twice as far apart on a slope; what is pointed at may be as
+small as a mug that stands near something else."""
 FLOOR_MARGIN_M = 0.04
+"""Metres above the floor up to which a reading is the floor's: its noise some metres away, and less
+than most things are tall."""
 LARGEST_SHARE = 0.6
+"""Share of the image that the surface's box covers at the most: more is a wall, or so near that the
+rest of the image is no room to follow it in."""
 LARGEST_M = 2.5
 """Metres of the widest and tallest that is followed: nobody is as tall, and walls are larger."""
 REACH = 3
@@ -33,7 +40,11 @@ REACH = 3
 LEVEL_SHARE = 0.4
 """A surface is level where its height falls by less than this share of an upright one's."""
 TABLE_SHARE = 0.7
+"""Area of the box without what is level, against that with it, below which what is pointed at
+stands on a table: a box alone loses little but its lid, one on a table most."""
 LEAST_PIXELS = 30
+"""Pixels of the view, at the least: six by five, a mug at five metres. Of less the outline is as
+unsure as the thing is large."""
 
 
 def surface_at(frame: Frame, u: float, v: float) -> Box:

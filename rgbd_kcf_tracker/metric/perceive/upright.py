@@ -26,16 +26,24 @@ HEIGHT = (0.6, 2.1)
 TOP = (0.9, 2.15)
 """Metres of the head's top above the floor."""
 WIDTH = (0.25, 1.0)
+"""Metres of one person's width: a chest seen from its side, with an arm before it, to arms half
+spread. Everyone at 1 Hz is a little worse from 0.18 m on (docs/metric.md)."""
 GROUP = 2.5
 """Metres of people who touch, at the most."""
 HEAD = (0.03, 0.2)
 NECK = (0.18, 0.34)
 SHOULDERS = (0.3, 0.5)
 TRUNK = (0.3, 0.8)
-"""Metres below the top between which the head is measured, and the rest."""
+"""Metres below the top between which the head is measured, and the rest. A head is some 0.22 m
+from crown to chin, and shoulders begin some 0.3 m below the crown; the topmost 3 cm are hair and
+noise. Neck and shoulders overlap, for people differ and stoop."""
 HEAD_WIDTH = (0.09, 0.34)
 SHOULDER_WIDTH = (0.26, 0.8)
 TRUNK_WIDTH = (0.13, 0.8)
+"""Metres from one side to the other, at the least and at the most. A head is 0.15 m wide and 0.2 m
+deep: less where hair gives no reading, more with a hood and the blur of depth at an outline.
+Shoulders are 0.35 to 0.5 m wide, less half turned, more with arms beside them; a trunk is 0.2 m
+deep from the side."""
 BROADER = 1.35
 """Shoulders against head, at the least."""
 SLENDER, STOUTER = 0.75, 0.8
