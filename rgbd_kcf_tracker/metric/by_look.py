@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting
+from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere, Image
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
@@ -28,18 +28,41 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
 
 LARGE_STEP = 0.08
-"""Seconds between frames in which a target may leave the window."""
+"""Seconds between frames in which a target may leave the window, and from which other places are
+looked at as well: where that was done at smaller steps, too, other players were found in two OTB
+sequences."""
 UNSURE = 0.7
+"""Share of the mean response below which the look alone is not enough: other places are looked at
+too after a :data:`LARGE_STEP`, and a leap of depth is not believed. A little above ``seen_ratio``,
+for what is well alike needs no check."""
 BETTER = 0.25
+"""Share of the mean response by which another place must be better than where the target was
+expected: others in like clothes respond nearly as much, and mostly it is where it was."""
 SCALE_RATE = 0.025
+"""Share of a new sample in the filter over scale, for each :data:`FRAME`, as in the paper of that
+filter (Danelljan et al., BMVC 2014)."""
 SCALE_TIME = 0.1
+"""Seconds in which the size follows depth: some frames at 30 Hz, so that one odd reading hardly
+counts, and at once at 10 Hz and less."""
 SCALE_RANGE = (0.1, 10.0)
+"""Times its first size that a target is at the least and at the most: a Kinect v2 sees from 0.5 to
+4.5 m, and so shows the same thing at most nine times as large. It keeps a lost size from running
+off."""
 SEARCH_WIDTH = 240
+"""Columns of the image in which colours are searched, about those of the view of depth: it costs
+the same at any resolution."""
 PEAKS = 2
+"""Places in the image that are looked at besides where the target was lost. Each costs as much as
+a look at the target itself, and the cost is to be the same whatever the image shows."""
 DEPTH_SAMPLES = 24
+"""Readings along the shorter side of the middle of a box: some hundreds are enough for a median,
+and a target that fills the image costs no more."""
 SAME_DEPTH = 0.15
+"""Share by which depth may change while the look is unsure. Who comes nearer at 1.5 m/s does so by
+that much in a tenth of a second at one metre; more of it is mostly somebody who passes before."""
 MOST = 0.6
-"""Share of readings in the middle of a box from which they are taken to be the target's."""
+"""Share of the pixels in the middle of a box that have a reading, from which these are taken to be
+the target's: where most have none, the target may be what reflects nothing, and they another's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +153,7 @@ class ByLook:
         """Learn from what :meth:`step` found."""
         if look.ratio > self._parameters.seen_ratio:
             self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
-            rate = min(0.15, SCALE_RATE * dt * 30)
+            rate = min(MAX_RATE, SCALE_RATE * dt / FRAME)
             self._scales.learn(
                 frame.color, self._cx, self._cy, look.box.width, look.box.height, rate
             )
