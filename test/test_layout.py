@@ -272,3 +272,53 @@ def test_every_file_states_its_licence(path: Path) -> None:
         '# Copyright 2026 The rgbd_kcf_tracker authors',
         '# SPDX-License-Identifier: Apache-2.0',
     ]
+
+
+def told(path: Path) -> Iterator[tuple[str, bool]]:
+    """Each constant of a module, and whether a docstring stands below it or its group."""
+    body = ast.parse(path.read_text(encoding='utf-8')).body
+    group: list[str] = []
+    for node, after in zip(body, [*body[1:], None], strict=True):
+        if isinstance(node, ast.Assign):
+            targets = node.targets
+        elif isinstance(node, ast.AnnAssign):
+            targets = [node.target]
+        else:
+            continue
+        names = (n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name))
+        group += [name for name in names if name.isupper() and not name.startswith('_')]
+        below = after is not None and after.lineno == (node.end_lineno or 0) + 1
+        if below and isinstance(after, ast.Assign | ast.AnnAssign):
+            continue  # one docstring after the last of them is enough
+        text = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+        said = text and below and isinstance(after.value.value, str)
+        yield from ((name, said) for name in group)
+        group = []
+
+
+@pytest.mark.parametrize(
+    'path',
+    [p for p in SOURCES if p.relative_to(ROOT / PACKAGE).parts[0] == 'metric'],
+    ids=lambda p: str(p.relative_to(ROOT)),
+)
+def test_every_constant_of_the_metric_path_is_explained(path: Path) -> None:
+    """What it is, in which unit, and why it has its value: the last only a reader can check."""
+    silent = [name for name, said in told(path) if not said]
+    assert not silent, f'{path.relative_to(ROOT)}: no docstring below {", ".join(silent)}'
+
+
+@pytest.mark.parametrize(
+    ('source', 'silent'),
+    [
+        ('A = 1\n"""Metres."""\nB, C = 2, 3\n"""Seconds."""\n', set()),
+        ('A = 1\nB = 2\n"""Metres, and seconds."""\n', set()),
+        ('A: int = 1\n\n"""No longer its docstring."""\n', {'A'}),
+        ('A = 1\n"""Metres."""\nB = 2\n\nC = 3\n"""Seconds."""\n', {'B'}),
+        ('A = 1\nfile = open(A)\n_B = 2\n', {'A'}),
+        ('A = 1\n5\n', {'A'}),
+    ],
+)
+def test_silent_constants_are_found(tmp_path: Path, source: str, silent: set[str]) -> None:
+    path = tmp_path / 'module.py'
+    path.write_text(source, encoding='utf-8')
+    assert {name for name, said in told(path) if not said} == silent
