@@ -86,7 +86,16 @@ def strip(
 def choose(
     indices: npt.NDArray[np.int64], interesting: npt.NDArray[np.bool_], count: int = FRAMES
 ) -> list[int]:
-    """Up to ``count`` of the kept frames: half evenly spread, half from the interesting ones."""
+    """Up to ``count`` of the kept frames: half evenly spread, half from the interesting ones.
+
+    Args:
+        indices: ``(K,)`` frames that may be chosen, ascending.
+        interesting: ``(N,)`` bool, of all frames.
+        count: of frames at the most.
+
+    Returns:
+        Their indices, ascending.
+    """
     if len(indices) <= count:
         return [int(i) for i in indices]
     special = indices[interesting[indices]]

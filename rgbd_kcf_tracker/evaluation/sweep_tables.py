@@ -108,7 +108,16 @@ def frames(folder: Path, sequences: Items[Sequence]) -> dict[str, int]:
 
 
 def best(tried: Array, count: int, sign: float) -> tuple[int, ...]:
-    """Indices of the best settings by mean score, those that failed anywhere left out."""
+    """The best settings by mean score, those that failed anywhere left out.
+
+    Args:
+        tried: ``(1 + S, Q)`` scores of the default and of the settings; NaN where one failed.
+        count: of settings at the most.
+        sign: 1 where more is better, -1 where less is.
+
+    Returns:
+        Indices of settings, 0 to S - 1, the best first.
+    """
     means = sign * tried[1:].mean(axis=1)  # NaN where one failed
     order = np.argsort(-np.where(np.isnan(means), -np.inf, means), kind='stable')
     return tuple(int(i) for i in order[:count] if not np.isnan(means[i]))

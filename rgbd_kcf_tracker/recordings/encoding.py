@@ -103,7 +103,13 @@ def encode_depth(
 def encode_compressed_color(
     color: ColorImage, codec: str = 'jpeg', quality: int = 90
 ) -> PackedImage:
-    """A picture as compressed_image_transport packs it; ``codec`` is 'jpeg' or 'png'."""
+    """A picture as compressed_image_transport packs it.
+
+    Args:
+        color: ``(H, W, 3)`` uint8 BGR.
+        codec: 'jpeg' or 'png', which loses nothing.
+        quality: of a JPEG, 0 to 100.
+    """
     if codec == 'png':
         return PackedImage('bgr8; png compressed bgr8', _imencode('.png', color, _PNG_PARAMETERS))
     flags = [int(cv2.IMWRITE_JPEG_QUALITY), quality]

@@ -142,7 +142,16 @@ def _written(values: Iterable[float], digits: str) -> str:
 
 
 def thinned(places: Array, weights: Array) -> tuple[Array, Array]:
-    """Every so many of particles that are too many to send, with weights whose sum is 1."""
+    """Every so many of particles that are too many to send.
+
+    Args:
+        places: ``(n, d)`` of the particles, three metres or two pixels each.
+        weights: ``(n,)``, at least 0.
+
+    Returns:
+        ``(m, d)`` places and ``(m,)`` weights whose sum is 1, ``m`` at most
+        :data:`MOST_PARTICLES`.
+    """
     step = max(1, -(-len(places) // MOST_PARTICLES))
     kept = weights[::step]
     total = float(kept.sum())

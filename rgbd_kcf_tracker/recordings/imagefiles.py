@@ -56,7 +56,15 @@ def even_stamps(count: int, fps: float) -> tuple[int, ...]:
 
 
 def metres(data: memoryview, max_pixels: int) -> DepthImage:
-    """The depth in an image file as we write it."""
+    """The depth in an image file as we write it.
+
+    Args:
+        data: all bytes of the file.
+        max_pixels: of the largest image that is read.
+
+    Returns:
+        ``(H, W)`` float32 metres, NaN where there is no reading.
+    """
     return decode_depth_bytes(data, max_pixels=max_pixels)
 
 

@@ -198,7 +198,15 @@ def decode_compressed_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImag
 
 
 def decode_color_bytes(data: memoryview, max_pixels: int = MAX_PIXELS) -> ColorImage:
-    """The picture in a JPEG, PNG or TIFF file's bytes; see :func:`decode_compressed_color`."""
+    """The picture in a JPEG, PNG or TIFF file's bytes; see :func:`decode_compressed_color`.
+
+    Args:
+        data: all bytes of the message or file.
+        max_pixels: of the largest image that is read.
+
+    Returns:
+        ``(H, W, 3)`` uint8 BGR.
+    """
     container = inspect(data, max_pixels)
     if container.bits != 8:
         raise EncodingError(
@@ -257,7 +265,14 @@ def metres_from_mm(values: npt.NDArray[np.uint16]) -> DepthImage:
 
 
 def metres_from_float(values: npt.NDArray[np.float32]) -> DepthImage:
-    """A float32 copy in native byte order; what is not finite or not above 0 becomes NaN."""
+    """A copy in native byte order; what is not finite or not above 0 becomes NaN.
+
+    Args:
+        values: ``(H, W)`` float32 metres in either byte order.
+
+    Returns:
+        ``(H, W)`` float32 metres.
+    """
     out = values.astype(np.float32)
     with np.errstate(invalid='ignore'):
         good = (out > 0) & (out < np.inf)

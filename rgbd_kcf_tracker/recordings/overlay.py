@@ -168,7 +168,14 @@ def _text(
 def draw_box(
     image: npt.NDArray[np.uint8], box: Box, color: tuple[int, int, int], thickness: int
 ) -> None:
-    """Draw the outline of a box into a picture, wherever it lies."""
+    """Draw the outline of a box into a picture, wherever it lies.
+
+    Args:
+        image: ``(H, W, 3)`` uint8 BGR, drawn into.
+        box: in its pixels.
+        color: blue, green and red, 0 to 255 each.
+        thickness: of the line in pixels.
+    """
     # Far outside the image OpenCV's fixed-point coordinates would overflow.
     height, width = image.shape[:2]
     shown = Box(box.x + width, box.y + height, box.width, box.height).clipped(3 * width, 3 * height)

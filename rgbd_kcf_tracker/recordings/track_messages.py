@@ -317,12 +317,12 @@ class TrackMessages:
         return make('vision_msgs/msg/ObjectHypothesisWithPose', hypothesis=hypothesis)
 
     def point(self, at: FloatArray) -> Any:
-        """``geometry_msgs/Point``."""
+        """``geometry_msgs/Point`` of ``(3,)`` metres."""
         x, y, z = (float(v) for v in at)
         return self._make('geometry_msgs/msg/Point', x=x, y=y, z=z)
 
     def vector(self, of: FloatArray) -> Any:
-        """``geometry_msgs/Vector3``."""
+        """``geometry_msgs/Vector3`` of ``(3,)``, in whatever unit the field has."""
         x, y, z = (float(v) for v in of)
         return self._make('geometry_msgs/msg/Vector3', x=x, y=y, z=z)
 

@@ -72,7 +72,11 @@ class Backdrop:
         return View(self.camera, rotation, place, Lighting(rotation @ sun))
 
     def draw(self, view: View) -> tuple[Image, Floats]:
-        """Colour and depth, for the caller to draw into."""
+        """Colour and depth, for the caller to draw into.
+
+        Returns:
+            ``(h, w, 3)`` uint8 BGR, and ``(h, w)`` float32 metres, inf where nothing is.
+        """
         if self._still is None or not self.scene.camera.fixed:
             self._still = self._draw(view)
         color, depth = self._still

@@ -62,7 +62,12 @@ class Solids:
     texture: npt.NDArray[np.int32]
 
     def moved(self, rotation: npt.NDArray[np.float64], offset: npt.NDArray[np.float64]) -> Solids:
-        """The same solids after ``p -> rotation @ (p - offset)``."""
+        """The same solids after ``p -> rotation @ (p - offset)``.
+
+        Args:
+            rotation: ``(3, 3)``.
+            offset: ``(3,)`` metres.
+        """
         return Solids(
             (self.origin - offset) @ rotation.T, rotation @ self.frame, self.taper,
             self.ellipsoid, self.texture,
@@ -132,7 +137,7 @@ class Layer:
 
     @property
     def mask(self) -> npt.NDArray[np.bool_]:
-        """Where the actor is."""
+        """Where the actor is, ``(h, w)`` bool."""
         return np.isfinite(self.z)
 
 

@@ -24,7 +24,14 @@ HAIR: tuple[Color, ...] = (
 
 
 def smooth_noise(rng: np.random.Generator, h: int, w: int, cells: float) -> npt.NDArray[np.float32]:
-    """Smooth noise in about [-1, 1] with ``cells`` bumps along the longer side."""
+    """Smooth noise, ``(h, w)`` float32 in about [-1, 1].
+
+    Args:
+        rng: source of it.
+        h: rows.
+        w: columns.
+        cells: bumps along the longer side.
+    """
     step = max(h, w) / max(cells, 1.0)
     coarse = rng.uniform(-1, 1, (int(h / step) + 3, int(w / step) + 3)).astype(np.float32)
     fine = cv2.resize(coarse, (w, h), interpolation=cv2.INTER_CUBIC)
@@ -35,25 +42,38 @@ def random_color(
     rng: np.random.Generator, saturation: tuple[float, float] = (0.1, 0.9),
     value: tuple[float, float] = (0.15, 0.9),
 ) -> Color:  # fmt: skip
-    """A random BGR colour within bounds of saturation and brightness."""
+    """A random colour, blue, green and red from 0 to 255.
+
+    Args:
+        rng: source of it.
+        saturation: its least and its most, 0 to 1.
+        value: likewise of its brightness.
+    """
     r, g, b = colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(*saturation), rng.uniform(*value))
     return b * 255, g * 255, r * 255
 
 
 def filled(h: int, w: int, color: Color) -> npt.NDArray[np.float32]:
-    """One colour, as float32 to work on."""
+    """One colour, ``(h, w, 3)`` float32 BGR from 0 to 255 to work on."""
     return np.full((h, w, 3), color, np.float32)
 
 
 def finished(image: npt.NDArray[np.float32]) -> Texture:
-    """Back to uint8."""
+    """Back from ``(h, w, 3)`` float32 BGR to uint8, cut off at 0 and 255."""
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
 def shaded(
     rng: np.random.Generator, image: npt.NDArray[np.float32], broad: float, grain: float
 ) -> Texture:
-    """Multiply in broad folds or stains and a fine grain."""
+    """Multiply in broad folds or stains and a fine grain.
+
+    Args:
+        rng: source of them.
+        image: ``(h, w, 3)`` float32 BGR from 0 to 255.
+        broad: share by which folds are about lighter or darker.
+        grain: deviation of each pixel's, as a share.
+    """
     h, w = image.shape[:2]
     gain = 1 + broad * smooth_noise(rng, h, w, 6) + broad * 0.6 * smooth_noise(rng, h, w, 17)
     gain += grain * rng.standard_normal((h, w), dtype=np.float32)
@@ -119,7 +139,16 @@ def print_letters(
     image: npt.NDArray[np.float32], letters: str, at: tuple[int, int], scale: float, color: Color,
     thickness: int,
 ) -> None:  # fmt: skip
-    """Print on a float image; OpenCV 5 draws letters on 8-bit images alone."""
+    """Print on a float image; OpenCV 5 draws letters on 8-bit images alone.
+
+    Args:
+        image: ``(h, w, 3)`` float32 BGR from 0 to 255, printed on.
+        letters: what to print.
+        at: column and row of the lower left corner in pixels.
+        scale: of OpenCV's font.
+        color: blue, green and red from 0 to 255.
+        thickness: of the strokes in pixels.
+    """
     mask = np.zeros(image.shape[:2], np.uint8)
     cv2.putText(mask, letters, at, cv2.FONT_HERSHEY_DUPLEX, scale, 255, thickness, cv2.LINE_AA)
     cover = mask[..., None].astype(np.float32) / 255
@@ -159,12 +188,12 @@ def _print_logo(
 
 
 def skin(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
-    """Bare skin."""
+    """Bare skin, ``(h, w, 3)``, of about a colour."""
     return shaded(rng, filled(h, w, color), broad=0.06, grain=0.02)
 
 
 def hair(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
-    """Hair: strands that run down."""
+    """Hair, ``(h, w, 3)``, of about a colour: strands that run down."""
     strands = cv2.GaussianBlur(
         rng.standard_normal((h, w), dtype=np.float32), (0, 0), sigmaX=0.8, sigmaY=h / 10
     )
@@ -173,7 +202,15 @@ def hair(rng: np.random.Generator, h: int, w: int, color: Color) -> Texture:
 
 
 def head(rng: np.random.Generator, h: int, w: int, skin_color: Color, hair_color: Color) -> Texture:
-    """A head unrolled from crown to chin, the face in the middle."""
+    """A head unrolled from crown to chin, ``(h, w, 3)``, the face in the middle.
+
+    Args:
+        rng: source of the details.
+        h: rows, from the crown to the chin.
+        w: columns, once around.
+        skin_color: blue, green and red from 0 to 255.
+        hair_color: likewise.
+    """
     image = skin(rng, h, w, skin_color)
     tone = np.array(skin_color, np.float64)
     x = w // 2

@@ -34,13 +34,27 @@ _TIE = 1e-9
 
 
 def cosine_window(shape: tuple[int, int]) -> npt.NDArray[np.float32]:
-    """Separable Hann window, zero on the border, against the wrap-round of the cyclic shifts."""
+    """Separable Hann window, zero on the border, against the wrap-round of the cyclic shifts.
+
+    Args:
+        shape: rows and columns of cells.
+
+    Returns:
+        ``(rows, cols)`` float32, 0 to 1.
+    """
     window = np.hanning(shape[0])[:, None] * np.hanning(shape[1])[None, :]
     return window.astype(np.float32)
 
 
 def spectrum(features: Real) -> Spectrum:
-    """Half spectrum over the last two axes (real input, so the other half is its mirror)."""
+    """Half spectrum over the last two axes (real input, so the other half is its mirror).
+
+    Args:
+        features: ``(..., rows, cols)``, of one patch or a stack of them.
+
+    Returns:
+        ``(..., rows, cols // 2 + 1)`` complex.
+    """
     transformed: Spectrum = fft.rfft2(features, axes=(-2, -1))
     return transformed
 

@@ -218,7 +218,13 @@ class KcfModel:
         return self.place(self.filter.respond(self.sample(frame, cx, cy)), cx, cy)
 
     def place(self, response: npt.NDArray[np.float64], cx: float, cy: float) -> Detection:
-        """Where in the image the peak of a response about ``cx, cy`` lies."""
+        """Where in the image the peak of a response lies.
+
+        Args:
+            response: ``(rows, cols)`` of the window's cells; element 0, 0 is no shift.
+            cx: column of the window's middle in pixels of the image.
+            cy: row of it.
+        """
         found = peak(response)
         across, down = self.geometry.cell
         return Detection(

@@ -35,7 +35,15 @@ def search_span(
 
 
 def window_starts(reach_cells: int, step_cells: int) -> npt.NDArray[np.int64]:
-    """Offsets of the windows from the middle one, in cells, symmetric about 0."""
+    """Offsets of the windows from the middle one, symmetric about 0.
+
+    Args:
+        reach_cells: that no window is farther from the middle one than, in cells.
+        step_cells: from one window to the next, in cells.
+
+    Returns:
+        ``(2 * (reach_cells // step_cells) + 1,)`` in cells, ascending.
+    """
     steps = reach_cells // step_cells
     return np.arange(-steps, steps + 1, dtype=np.int64) * step_cells
 

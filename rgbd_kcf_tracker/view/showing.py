@@ -219,7 +219,12 @@ def _particles(places: npt.NDArray[Any], weights: npt.NDArray[Any], digits: int 
 
 
 def ellipse(particles: npt.NDArray[Any], weights: npt.NDArray[Any]) -> list[float]:
-    """The ellipse about particles from above, see :func:`ellipse_of`."""
+    """The ellipse about particles from above, see :func:`ellipse_of`.
+
+    Args:
+        particles: ``(n, 3)`` metres in the camera's frame.
+        weights: ``(n,)`` whose sum is 1.
+    """
     places = particles[:, [0, 2]]
     mean = weights @ places
     away = places - mean
@@ -231,6 +236,10 @@ def ellipse_of(mean: npt.NDArray[Any], spread: npt.NDArray[Any]) -> list[float]:
     """The ellipse that holds 95 % of a normal spread: x, z, both half axes, angle.
 
     Metres and radians, the angle from x towards z.
+
+    Args:
+        mean: ``(2,)`` metres, x and z.
+        spread: ``(2, 2)`` square metres, its covariance.
     """
     values, vectors = np.linalg.eigh(spread)
     major, minor = (_HOLDS_95 * float(np.sqrt(max(v, 0.0))) for v in (values[1], values[0]))

@@ -65,11 +65,12 @@ def compare(
     """Hold a run against its ground truth.
 
     Args:
-        predicted: the tracker's boxes.
-        truth: boxes of the visible part; whether the target is present is decided by these alone.
+        predicted: the tracker's boxes in pixels, one for each of ``N`` frames.
+        truth: as many of the visible part; whether the target is present is decided by these
+            alone.
         body: boxes of the whole body, known on simulated scenes. In each frame a predicted box is
             then held against the one of the two that it overlaps more: a tracker may draw either.
-        scores: the tracker's scores.
+        scores: ``(N,)``, the tracker's.
         skip: frames at the start that never count: 1, the given box, by default.
 
     Raises:

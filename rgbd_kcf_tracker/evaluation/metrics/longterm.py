@@ -49,7 +49,13 @@ class LongTerm:
 
 
 def scored(predicted: Boxes, scores: Array, truth: Boxes) -> ScoredSequence:
-    """A sequence's overlaps and scores; ``scores`` count only where there is a predicted box."""
+    """A sequence's overlaps and scores.
+
+    Args:
+        predicted: the tracker's boxes, ``N`` of them.
+        scores: ``(N,)``, of which those count where there is a predicted box.
+        truth: ``N`` boxes.
+    """
     return ScoredSequence(
         overlaps=np.nan_to_num(iou(predicted, truth), nan=0.0),
         scores=np.where(present(predicted), np.asarray(scores, np.float64), np.nan),
@@ -58,7 +64,15 @@ def scored(predicted: Boxes, scores: Array, truth: Boxes) -> ScoredSequence:
 
 
 def score_thresholds(scores: Array, resolution: int = RESOLUTION) -> Array:
-    """Infinity, then the scores or their quantiles downwards, then minus infinity."""
+    """Infinity, then the scores or their quantiles downwards, then minus infinity.
+
+    Args:
+        scores: ``(N,)``, NaN where there is no box.
+        resolution: number of thresholds at the most.
+
+    Returns:
+        ``(T,)`` descending.
+    """
     ordered = np.unique(scores[~np.isnan(scores)])[::-1]
     if len(ordered) > resolution - 2:
         chosen = np.linspace(0, len(ordered) - 1, resolution - 2).round().astype(np.int64)
@@ -73,6 +87,13 @@ def precision_recall(sequence: ScoredSequence, thresholds: Array) -> tuple[Array
     Precision is the mean overlap of the boxes whose score is at least the threshold (1 without
     any), recall their summed overlap over the number of frames in which the target shows (0 where
     it never shows).
+
+    Args:
+        sequence: the boxes and their scores.
+        thresholds: ``(T,)``.
+
+    Returns:
+        ``(T,)`` each, 0 to 1.
     """
     kept = sequence.scores[:, None] >= thresholds[None, :]  # NaN is never kept
     boxes = kept.sum(axis=0)

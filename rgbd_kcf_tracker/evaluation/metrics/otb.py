@@ -42,7 +42,14 @@ def precision_curve(errors: Array) -> Array:
 
 
 def area_under_curve(curve: Array) -> float:
-    """AUC as the benchmark takes it: the mean of the curve's values."""
+    """AUC as the benchmark takes it: the mean of the curve's values.
+
+    Args:
+        curve: ``(T,)`` shares of frames, 0 to 1.
+
+    Returns:
+        0 to 1, NaN where no frame counts.
+    """
     return float(np.mean(curve))
 
 

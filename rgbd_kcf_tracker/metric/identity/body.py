@@ -243,7 +243,13 @@ class Body:
         self._odds = None
 
     def learn_around(self, codes: Codes, known: npt.NDArray[np.bool_], dt: float | None) -> None:
-        """Follow the colours of what stands beside the body: ``codes`` where ``known``."""
+        """Follow the colours of what stands beside the body.
+
+        Args:
+            codes: ``(h, w)`` of the colours about the body.
+            known: ``(h, w)`` bool, which of these pixels are of something beside it.
+            dt: seconds since the last time, None at first.
+        """
         rate = np.float32(0.7 if dt is None else 1 - np.exp(-dt / COLOR_TIME))
         counts = np.bincount(codes[known], minlength=CODES).astype(np.float32)
         counts = smoothed(counts[None])[0]

@@ -43,7 +43,12 @@ class Elsewhere:
         self._refused = None
 
     def refuse(self, image: Image, box: Box) -> None:
-        """Take a picture of which a box shows something else than the target."""
+        """Take a picture of which a box shows something else than the target.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR.
+            box: in its pixels.
+        """
         self._refused = image, box
 
     def forget(self) -> None:

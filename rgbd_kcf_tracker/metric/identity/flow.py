@@ -101,7 +101,14 @@ class TextureFlow:
         self._last = None
 
     def since(self, color: Image) -> Flow | None:
-        """How the target has moved since :meth:`keep`; None where the flow does not tell."""
+        """How the target has moved since :meth:`keep`, in pixels of the image.
+
+        Args:
+            color: ``(H, W, 3)`` uint8 BGR, of the size of that given to :meth:`keep`.
+
+        Returns:
+            None where the flow does not tell, or nothing is kept.
+        """
         last = self._last
         if last is None:
             return None

@@ -199,10 +199,10 @@ class Person:
         self._resembles, other._resembles = {}, {}
 
     def carried(self, motion: Pose, ahead: FloatArray) -> None:
-        """Keep the place in the world while the camera moves.
+        """Keep the place and the velocity in the world while the camera moves.
 
         Args:
-            motion: the pose of the last camera's frame in that of now.
+            motion: the pose of the last camera's frame in that of now, in metres.
             ahead: ``(3,)`` unit vector along the floor away from the camera.
         """
         across = np.array([1.0, 0.0, 0.0])

@@ -74,7 +74,7 @@ class Picture:
 
 
 def rgb(frame: Frame) -> Array:
-    """The colour image as matplotlib takes it."""
+    """The colour image as matplotlib takes it, ``(H, W, 3)`` uint8 RGB."""
     return frame.color[:, :, ::-1]
 
 
@@ -169,7 +169,7 @@ def legend(axes: Axes) -> None:
 
 
 def centred(response: Array) -> Array:
-    """A response with the zero shift in the middle, as the thesis draws it."""
+    """A response, ``(..., rows, cols)``, with no shift in the middle, as the thesis draws it."""
     return np.fft.fftshift(response, axes=(-2, -1))
 
 
