@@ -357,17 +357,29 @@ def test_the_mug_is_found_again_each_time(shared_data: Path):
 
 
 @pytest.mark.slow
-def test_a_box_that_the_camera_turns_away_from_is_nothing_else(shared_data: Path):
-    """Backwards it is in view for a second. White papers on a worktop were it for four, at 0.99."""
+@pytest.mark.parametrize(
+    ('order', 'box', 'seen', 'gone'),
+    [
+        # White papers on a worktop were the plastic box for four seconds, at 0.99.
+        (slice(330, None, -1), Box(482, 222, 135, 116), 16, slice(30, None)),
+        # Another chair was the one behind the table, by its look and then by its surface.
+        (slice(0, 180), Box(420, 146, 126, 60), 50, slice(90, 165)),
+    ],
+)
+def test_what_the_camera_turns_away_from_is_nothing_else(
+    shared_data: Path, order: slice, box: Box, seen: int, gone: slice
+):
     folder = shared_data / 'rgbd' / 'redkitchen'
     camera = Intrinsics(526.5, 526.5, 324, 238)
-    seen = frames_of(folder, 30.0, camera, depth=True)[330::-1]
-    frames = [dataclasses.replace(f, stamp_ns=i * 33_333_333) for i, f in enumerate(seen)]
+    frames = [
+        dataclasses.replace(frame, stamp_ns=i * 33_333_333)
+        for i, frame in enumerate(frames_of(folder, 30.0, camera, depth=True)[order])
+    ]
     tracker = create_tracker('metric')
-    tracker.start(frames[0], Box(482, 222, 135, 116))
-    tracks = [tracker.update(frame) for frame in frames[1:]]
-    assert all(track.box is not None for track in tracks[:16])
-    assert all(track.box is None for track in tracks[30:])
+    tracks = [tracker.start(frames[0], box)]
+    tracks += [tracker.update(frame) for frame in frames[1:]]
+    assert all(track.box is not None for track in tracks[:seen])
+    assert all(track.box is None for track in tracks[gone])
 
 
 @pytest.mark.slow

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
-from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
+from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
@@ -29,6 +30,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
     triple,
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -36,6 +38,10 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
+FloatArray = npt.NDArray[np.float64]
+
+LOOK_SIGMA = np.full(3, 0.1)
+"""Metres by which the middle of a box found by look is off the target's."""
 EVEN = 0.5
 """Probability from which a box is shown as the target's alone."""
 SURE = 0.6
@@ -141,6 +147,7 @@ class Follower:
         self._about: frozenset[int] = frozenset()
         self._ends: Sides | None = None
         self._elsewhere = Elsewhere()
+        self._stood: Stood | None = None
         self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
@@ -385,17 +392,28 @@ class Follower:
         self._follow_size(frame)
         if account is not None and account.scene.motion is not None:
             self._carried = True
+            if self._stood is not None:
+                self._stood.carried(account.scene.motion)
         look = self._look.step(frame, dt)
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
-            if unlike or any(
-                refused(account, look.box) for refused in (self._stands, self._taken, self._far)
+            if (
+                unlike
+                or self._stood_elsewhere(account, look)
+                or any(
+                    refused(account, look.box) for refused in (self._stands, self._taken, self._far)
+                )
             ):
                 self._look.refuse(frame, look)
                 look = None
         if look is not None:
             self._look.take(frame, look, dt)
+            if account is not None and look.depth is not None:
+                place = _place(account.scene.view, look.box, look.depth)
+                if self._stood is None:
+                    self._stood = Stood(place)
+                self._stood.seen(place, LOOK_SIGMA, dt)
             self._last_box, self._unseen, self._carried = look.box, 0.0, False
         else:
             self._unseen += dt
@@ -417,6 +435,13 @@ class Follower:
             across, down, b = frame.width / width, frame.height / height, self._last_box
             self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
             self._size_of_image = frame.width, frame.height
+
+    def _stood_elsewhere(self, account: Account, look: Look) -> bool:
+        """Whether what is found again is not where the target, which does not move, stood."""
+        if self._stood is None or self._unseen == 0 or look.depth is None:
+            return False
+        place = _place(account.scene.view, look.box, look.depth)
+        return self._stood.log_odds(place, LOOK_SIGMA) < ELSEWHERE
 
     def _stands(self, account: Account, box: Box) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
@@ -566,6 +591,13 @@ def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
     b = box.scaled(MIDDLE).over(scene.view.step)
     return scene.view.part(b.x, b.y, b.right, b.bottom)
+
+
+def _place(view: DepthView, box: Box, depth: float) -> FloatArray:
+    """Where the middle of a box of the image is at a depth, ``(3,)`` metres."""
+    k = view.intrinsics
+    across, down = (box.cx / view.step - k.cx) / k.fx, (box.cy / view.step - k.cy) / k.fy
+    return np.array([across * depth, down * depth, depth])
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:

@@ -16,8 +16,10 @@ from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 
-LONG_ENOUGH = 0.5
-"""Seconds of standing still from which a thing is one that does."""
+CHOSEN_MOVING = 0.5
+"""Probability that a thing moves, before it was seen for a while: it may or may not."""
+STANDS = 0.3
+"""Seconds of standing still after which that is a third: what moves shows it in half a second."""
 OFF = 0.25
 """Metres by which what is seen of a thing that stands still is elsewhere: another side, a part."""
 DRIFT = 0.1
@@ -69,11 +71,11 @@ class Stood:
 
     @property
     def known(self) -> bool:
-        """Whether the target has always stood still, for long enough to say so.
+        """Whether the target has always stood still.
 
         It says nothing before the camera has moved: one that stands still sees what starts to move.
         """
-        return self._carried and self._known and self._for >= LONG_ENOUGH
+        return self._carried and self._known
 
     def log_odds(self, place: FloatArray, sigma: FloatArray) -> float:
         """What a place says for its being the target, 0 where that is not known.
@@ -86,4 +88,5 @@ class Stood:
             return 0.0
         variance = np.square(sigma) + (OFF + self._off) ** 2
         near = math.exp(GAIN - 0.5 * float((np.square(place - self._place) / variance).sum()))
-        return math.log((1 - CARRIED_OFF) * near + CARRIED_OFF)
+        moved = CARRIED_OFF + (CHOSEN_MOVING - CARRIED_OFF) * math.exp(-self._for / STANDS)
+        return math.log((1 - moved) * near + moved)
