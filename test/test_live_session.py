@@ -80,6 +80,63 @@ def test_who_is_followed_already_is_not_added_again() -> None:
     assert refused == ['what is in that box is followed already, as target 1']
 
 
+def test_a_box_of_what_is_followed_adds_nothing_with_any_variant() -> None:
+    for variant in ('metric', 'kcf'):
+        made, refused, _ = session(variant)
+        made.choose(lambda _: FIRST.box)
+        made.add(lambda _: SECOND.box)
+        run(made, 0, 2)
+        for person in (FIRST, SECOND):
+            made.add(lambda _, person=person: person.box.moved(6, 4))
+        run(made, 2, 2)
+        assert ids(made) == [1, 2]
+        assert len(made._targets) == 2
+        assert refused == [
+            'what is in that box is followed already, as target 1',
+            'what is in that box is followed already, as target 2',
+        ]
+
+
+def test_so_many_are_followed_at_once_and_no_more() -> None:
+    made, refused, _ = session('kcf')
+    made.most = 2
+    for person in ALL:
+        made.add(lambda _, box=person.box: box)
+    run(made, 0, 2)
+    assert ids(made) == [1, 2]
+    (words,) = refused
+    assert words.startswith('2 targets are followed, as many as max_targets allows')
+    made.remove(1)
+    made.add(lambda _: THIRD.box)
+    run(made, 2, 2)
+    assert ids(made) == [2, 3]
+    made.choose(lambda _: FIRST.box)  # takes the place of the chosen one
+    run(made, 4, 1)
+    assert ids(made) == [2, 4]
+    assert len(refused) == 1
+
+
+def test_many_that_are_added_at_once_take_only_a_share_of_the_time() -> None:
+    clock = [0.0]
+    made = Session('kcf', default_parameters('kcf'), lambda _: None, lambda: clock[0])
+    looked: list[int] = []
+
+    def look(number: int) -> Box:
+        looked.append(number)
+        clock[0] += 0.2
+        return ALL[number % 3].box
+
+    for number in range(9):
+        made.add(lambda _, number=number: look(number))
+    made.process(picture(ALL, 0.0))
+    assert looked == [0, 1]
+    made.process(picture(ALL, 0.1))
+    assert looked == [0, 1]
+    clock[0] += 2
+    made.process(picture(ALL, 0.2))
+    assert looked[:3] == [0, 1, 2]
+
+
 def test_another_target_has_another_id_and_ids_outlive_resets() -> None:
     made, _, _ = session()
     for number, person in enumerate(ALL, 1):

@@ -31,6 +31,7 @@ from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_rig import FRAME_ID, HEIGHT, WIDTH, Rig, running_node, scene, stamp_of
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
+from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.rig import resident_mb
@@ -534,6 +535,50 @@ def test_requests_do_not_starve_images(live: Live, rate: int) -> None:
     live.answered(since, 45)  # while the requests go on
     stop.set()
     thread.join()
+    live.goes_on(first + 45)
+
+
+@pytest.mark.parametrize('ask', ['again', 'anywhere', 'and remove'])
+def test_additions_at_any_rate_do_not_starve_images(live: Live, ask: str) -> None:
+    first = live.begin()
+    rig, since = live.rig, len(live.rig.boxes)
+    stop = threading.Event()
+    asked = [scene(first)[2]]
+    add = rig.node.create_publisher(RegionOfInterest, '/tracker/add', 10)
+    remove = rig.node.create_publisher(UInt32, '/tracker/remove', 10)
+    rig.wait(lambda: add.get_subscription_count() and remove.get_subscription_count())
+    time.sleep(0.2)  # discovery is one-sided
+
+    def storm() -> None:
+        rng = np.random.default_rng(4)
+        while not stop.wait(1 / 60):
+            x, y, width, height = (round(v) for v in asked[0].as_tuple())
+            if ask != 'again':
+                x, y = int(rng.integers(0, WIDTH - width)), int(rng.integers(0, HEIGHT - height))
+            add.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+            if ask == 'and remove':
+                for track in live.node._session.others:
+                    remove.publish(UInt32(data=track.id))
+
+    live.node.set_parameters([Parameter('max_targets', value=3)])
+    thread = threading.Thread(target=storm)
+    thread.start()
+    for index in range(first, first + 45):
+        asked[0] = scene(index)[2]
+        rig.send(index)
+        time.sleep(1 / 30)
+    try:
+        live.answered(since, 45)  # while the requests go on
+        assert 1 <= len(live.node._session.asked_for) <= 3
+    finally:
+        stop.set()
+        thread.join()
+    if ask == 'again':
+        assert live.node._session.others == ()
+        live.says('rejected_requests', 'is followed already, as target')
+    elif ask == 'anywhere':
+        live.says('rejected_requests', '3 targets are followed')
+    live.node.set_parameters([Parameter('max_targets', value=8)])
     live.goes_on(first + 45)
 
 

@@ -225,7 +225,8 @@ class Processor:
             return
         capture, time_ns = self._last
         if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
-            frame = self.frame(capture, time_ns)
+            with self.session.charged():
+                frame = self.frame(capture, time_ns)
             if frame is not None:
                 self.session.start_as_asked(frame)
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.insight import Insight, insight_in
+from rgbd_kcf_tracker.live.settings import MOST_TARGETS
 from rgbd_kcf_tracker.live.story import Story, taken
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.pose import Pose
@@ -36,7 +38,10 @@ REQUESTS_CREDIT_S = 0.3
 """So much of it is saved up: a few requests in a row are met at once."""
 MOST_ADDITIONS = 50
 """Targets that wait to be added at most."""
-
+SAME = 0.5
+"""Overlap (intersection over union) with a target's box from which a box shows that target, as is
+common for matching boxes: of two of one size, each then holds two thirds of the other."""
+_ALREADY = 'what is in that box is followed already, as target {}'
 
 _warm: set[str] = set()
 
@@ -73,6 +78,7 @@ class Session:
     Attributes:
         track: of the chosen target.
         others: tracks of the others.
+        most: targets that are chosen or added and followed at once.
     """
 
     def __init__(
@@ -101,6 +107,7 @@ class Session:
         self._credit_s, self._credited = REQUESTS_CREDIT_S, now()
         self.track = IDLE
         self.others: tuple[Track, ...] = ()
+        self.most = MOST_TARGETS
 
     @property
     def variant(self) -> str:
@@ -246,17 +253,23 @@ class Session:
     # -- starting ---------------------------------------------------------------------------------
 
     def start_as_asked(self, frame: Frame) -> bool:
-        """Start on this frame, if that was asked; True where there is a new chosen target."""
-        if not self.due:
-            return False
+        """Start on this frame what is :attr:`due`; True where there is a new chosen target."""
+        with self.charged():
+            started = self._chosen_as_asked(frame)
+        # One at least: the chosen one may be asked for again and again.
+        for _ in range(len(self._additions)):
+            with self.charged():
+                self._added_as_asked(frame, self._additions.popleft())
+            if self._credit_s <= 0:
+                break
+        return started
+
+    @contextmanager
+    def charged(self) -> Iterator[None]:
+        """Count what is done within as time that went into requests."""
         begun = self._now()
         try:
-            additions = list(self._additions)
-            self._additions.clear()
-            started = self._chosen_as_asked(frame)
-            for addition in additions:
-                self._added_as_asked(frame, addition)
-            return started
+            yield
         finally:
             self._credit_s -= self._now() - begun
 
@@ -278,6 +291,13 @@ class Session:
             box = choice(frame)
             if box is None:
                 self._additions.append(choice)
+            elif (number := self._shown_in(box)) is not None:
+                self._report(_ALREADY.format(number))
+            elif len(self._added) + (self._chosen is not None) >= self.most:
+                self._report(
+                    f'{self.most} targets are followed, as many as max_targets allows: remove one '
+                    'before another is added'
+                )
             elif self._chosen is None:
                 self.start(frame, box)
             else:
@@ -285,11 +305,23 @@ class Session:
         except RgbdKcfError as error:
             self._report(str(error))
 
+    def _shown_in(self, box: Box) -> int | None:
+        """The id of the target that was chosen or added, and that a box shows."""
+        known = self.asked_for
+        return next(
+            (
+                track.id
+                for track in (self.track, *self.others)
+                if track.id in known and track.box is not None and track.box.iou(box) >= SAME
+            ),
+            None,
+        )
+
     def _add(self, frame: Frame, box: Box) -> None:
         inner = self._targets.add(frame, box)
         track = self._named(self._targets.started(inner))
         if inner == self._chosen or inner in self._added:
-            self._report(f'what is in that box is followed already, as target {track.id}')
+            self._report(_ALREADY.format(track.id))
             return
         self._added.append(inner)
         self.others = (*(t for t in self.others if t.id != track.id), track)
@@ -344,10 +376,11 @@ class Session:
 
     def process(self, frame: Frame) -> Track:
         """Follow the targets into the next frame, or start on it; the chosen one's track."""
-        others = bool(self._added) or self._targets.everyone
+        # What is to be added is compared with where the others are in this frame.
+        others = bool(self._added or self._additions) or self._targets.everyone
         if others:
             self._update(frame)
-        if self.start_as_asked(frame):
+        if self.due and self.start_as_asked(frame):
             return self.track
         if self._choice is None and self._auto is not None and self._auto_due():
             found = self._auto(frame)

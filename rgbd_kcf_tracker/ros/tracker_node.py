@@ -145,6 +145,7 @@ class TrackerNode(LifecycleNode):
                 tell=self.get_logger().info,
             )
             self._session.everyone = settings.follow_everyone
+            self._session.most = settings.max_targets
             warm_up(settings.variant)
             self._outputs = TrackPublishers(self, lambda: self._settings)
             if settings.target_frame or settings.fixed_frame:
@@ -320,6 +321,9 @@ class TrackerNode(LifecycleNode):
         if session is not None and 'follow_everyone' in names:
             wanted = self._settings.follow_everyone
             self._in_worker('everyone', lambda: setattr(session, 'everyone', wanted))
+        if session is not None and 'max_targets' in names:
+            most = self._settings.max_targets
+            self._in_worker('most', lambda: setattr(session, 'most', most))
 
     def _in_worker(self, kind: str, function: Callable[[], None]) -> None:
         if self._worker is not None:
