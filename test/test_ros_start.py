@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -21,18 +22,32 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 import rclpy
 from rclpy.lifecycle import LifecycleNode
 
-from rgbd_kcf_tracker.ros import replay_main, replay_node, tracker_main, tracker_node
+from rgbd_kcf_tracker.ros import (
+    follow_main,
+    replay_main,
+    replay_node,
+    tracker_main,
+    tracker_node,
+    viewer_main,
+)
 from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE
 
 pytestmark = pytest.mark.ros
 
-MAINS = {'tracker': tracker_main.main, 'replay': replay_main.main}
+MAINS = {
+    'tracker': tracker_main.main,
+    'replay': replay_main.main,
+    'follow': follow_main.main,
+}
+if find_spec('aiohttp') is not None:
+    MAINS['viewer'] = viewer_main.main
 
 
 @pytest.fixture
 def _process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What a main program changes in its process, put back."""
     monkeypatch.setenv(PROFILE_VARIABLE, '')
+    monkeypatch.setattr(os, 'nice', lambda _: None)  # that of the tests stays
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
     for number, handler in before.items():

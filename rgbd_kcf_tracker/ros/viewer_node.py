@@ -28,7 +28,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
-from rgbd_kcf_tracker.parameters import ParameterInfo, describe
+from rgbd_kcf_tracker.parameters import describe
 from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.evidence_messages import evidence_of
 from rgbd_kcf_tracker.recordings.images import (
@@ -38,6 +38,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_depth,
 )
 from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
+from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view.commands import Command
@@ -74,8 +75,10 @@ class ViewerNode(Node):
     """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__('viewer', **options)
-        self.settings = self._declared()
+        super().__init__('viewer', **options, **DECLARE_OVERRIDES)
+        infos = {info.name: info for info in describe(ViewerParameters)}
+        declare_all(self, infos, lambda _: True)
+        self.settings = ViewerParameters(**{name: self.get_parameter(name).value for name in infos})
         tracker = self.settings.tracker.rstrip('/')
         # Its full name, as diagnostics and messages to people have it.
         self._tracker = self.resolve_topic_name(f'{tracker}/state').removesuffix('/state')
@@ -95,16 +98,6 @@ class ViewerNode(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._poll, clock=steady)
         self.create_timer(SETTINGS_S, self._ask_settings, clock=steady)
-
-    def _declared(self) -> ViewerParameters:
-        values = {}
-        for info in describe(ViewerParameters):
-            try:
-                declared = self.declare_parameter(info.name, info.default, _descriptor(info))
-            except Exception as error:  # rclpy has no common class for overrides of a wrong type
-                raise ParameterError(f'parameter {info.name}: {error}') from None
-            values[info.name] = declared.value
-        return ViewerParameters(**values)
 
     # -- what comes -------------------------------------------------------------------------------
 
@@ -313,9 +306,3 @@ def _region(box: Box) -> RegionOfInterest:
     if not (0 < width < 2**31 and 0 < height < 2**31 and x < 2**31 and y < 2**31):
         raise ParameterError('that box has no size')
     return RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height)
-
-
-def _descriptor(info: ParameterInfo) -> Any:
-    from rcl_interfaces.msg import ParameterDescriptor
-
-    return ParameterDescriptor(description=info.description, read_only=True)
