@@ -264,6 +264,28 @@ def rows(text: str) -> list[str]:
     return text.splitlines()[1:]
 
 
+@pytest.mark.usefixtures('rig')
+def test_of_a_box_from_the_page_the_part_in_the_picture_is_asked_for() -> None:
+    with running_viewer() as (node, _):
+        asked: list[Any] = []
+        node._add.publish = asked.append
+
+        def box(*values: float) -> Command:
+            return Command('box', dict(zip(('x', 'y', 'width', 'height'), values, strict=True)))
+
+        with pytest.raises(ParameterError, match='no picture has come yet'):
+            node._carry_out(box(10, 10, 20, 20))
+        node.page.image(Frame(np.zeros((240, 320, 3), np.uint8)), 1)
+        for values in ((-30, 10, 50, 40), (300, 200, 2**32, 2**32), (5, 6, 7, 8)):
+            node._carry_out(box(*values))
+        assert [(r.x_offset, r.y_offset, r.width, r.height) for r in asked] == [
+            (0, 10, 20, 40), (300, 200, 20, 40), (5, 6, 7, 8),
+        ]  # fmt: skip
+        for values in ((-30, 10, 20, 40), (400, 10, 20, 40)):
+            with pytest.raises(ParameterError, match='outside the picture'):
+                node._carry_out(box(*values))
+
+
 def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:
     with running_node(rig, init_box='140,90,36,60'):
         with running_viewer() as (_, server):

@@ -315,6 +315,19 @@ def test_a_port_that_is_taken_is_said(server: Server, stub: Stub) -> None:
         Server(stub, port=99999).start()
 
 
+@pytest.mark.parametrize('width', [2**32 - 50, 4294967246.0])
+def test_a_number_is_taken_however_it_is_written(width: float) -> None:
+    box = {'do': 'box', 'x': 1, 'y': 2, 'width': width, 'height': 3, 'frame': 0}
+    assert parse(json.dumps(box)).values['width'] == 4294967246.0
+
+
+@pytest.mark.parametrize('width', ['9' * 400, '-1' + '0' * 17, '1e17', '1e999'])
+def test_a_number_out_of_range_is_called_so(width: str) -> None:
+    box = f'{{"do": "box", "x": 1, "y": 2, "width": {width}, "height": 3, "frame": 0}}'
+    with pytest.raises(ParameterError, match='box: width is out of range'):
+        parse(box)
+
+
 def test_commands_are_typed() -> None:
     box = '{"do": "box", "x": 1, "y": 2.5, "width": 3, "height": 4, "frame": 7}'
     assert parse(box).values == {'x': 1.0, 'y': 2.5, 'width': 3.0, 'height': 4.0, 'frame': 7}

@@ -38,6 +38,8 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_depth,
 )
 from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+from rgbd_kcf_tracker.ros.messages import ROS_TYPES
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
@@ -56,6 +58,7 @@ SETTINGS_S = 2.0
 LINGER_S = 3.0
 """Seconds after the last browser has gone in which the images are still listened to."""
 PAIR_NS = 20_000_000
+_MAKE = TrackMessages(ROS_TYPES)
 HELD = 6
 """Images that are kept for their partner."""
 
@@ -231,15 +234,15 @@ class ViewerNode(Node):
         values = command.values
         if command.do == 'box':
             box = Box(*(values[name] for name in ('x', 'y', 'width', 'height')))
-            self._add.publish(_region(box))
+            self._add.publish(self._region(box))
         elif command.do == 'point':
             if self.page.frame is None:
                 raise ParameterError('no picture has come yet')
             box = surface_at(self.page.frame, values['x'], values['y'])
-            self._add.publish(_region(box))
+            self._add.publish(self._region(box))
         elif command.do == 'follow':
             # A new choice of one who is followed already keeps its id.
-            self._init.publish(_region(self.page.box_of(values['id'])))
+            self._init.publish(self._region(self.page.box_of(values['id'])))
         elif command.do == 'remove':
             if not self._remove.get_subscription_count():
                 raise ParameterError(f'{self._tracker} does not answer: is it running?')
@@ -264,6 +267,20 @@ class ViewerNode(Node):
             )
         else:
             raise ParameterError(f'{command.do} is for recordings: this is live')
+
+    def _region(self, box: Box) -> RegionOfInterest:
+        """A box as the tracker takes it: the part of it that lies in the picture.
+
+        Raises:
+            ParameterError: where there is no picture, or no part of the box lies in it.
+        """
+        frame = self.page.frame
+        if frame is None:
+            raise ParameterError('no picture has come yet')
+        region = _MAKE.region(box, frame.width, frame.height)
+        if region is None:
+            raise ParameterError('that box lies outside the picture')
+        return region
 
     def _set(self, parameters: list[Parameter]) -> None:
         if not self._remote.services_are_ready():
@@ -293,16 +310,3 @@ class ViewerNode(Node):
                 }
 
         self._remote.get_parameters(names, callback=told)
-
-
-def _region(box: Box) -> RegionOfInterest:
-    """A box as the tracker takes it, in whole pixels.
-
-    Raises:
-        ParameterError: where it has no size.
-    """
-    x, y, width, height = (round(value) for value in box.as_tuple())
-    x, y = max(x, 0), max(y, 0)
-    if not (0 < width < 2**31 and 0 < height < 2**31 and x < 2**31 and y < 2**31):
-        raise ParameterError('that box has no size')
-    return RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height)

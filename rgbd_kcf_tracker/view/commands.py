@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +14,8 @@ from rgbd_kcf_tracker.errors import ParameterError
 LARGEST_MESSAGE = 4096
 """Bytes of a message: a box, a name or a parameter takes a few hundred."""
 LONGEST_NAME = 40
+_FARTHEST = 2**53
+"""Largest number: up to it integers and floats are the same."""
 
 # What each command takes, and of which type.
 _FIELDS: dict[str, dict[str, type]] = {
@@ -77,15 +78,13 @@ def _refuse(constant: str) -> float:
 
 
 def _checked(do: str, name: str, value: Any, kind: Any) -> Any:
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value) if abs(value) < 1e9 else math.inf
+    if kind in (int, float) and type(value) in (int, float):
+        if abs(value) > _FARTHEST:  # an integer may be too large for a float, and 1e999 is infinite
+            raise ParameterError(f'{do}: {name} is out of range')
+        value = float(value) if kind is float else value
     if kind is object:
         if type(value) in (bool, int, float, str) and len(str(value)) <= 200:
             return value
     elif type(value) is kind:
-        if kind is float and not math.isfinite(value):
-            raise ParameterError(f'{do}: {name} is not finite')
-        if kind is int and abs(value) > 2**53:
-            raise ParameterError(f'{do}: {name} is out of range')
         return value.strip()[:LONGEST_NAME] if kind is str and name == 'name' else value
     raise ParameterError(f'{do}: {name} must be of type {kind.__name__}')
