@@ -219,6 +219,8 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
 
         def choose() -> None:
             box = scene(rig.index)[2]  # type: ignore[attr-defined]
+            # Who is followed already is not added again.
+            page.value("page.shown.targets.forEach(t => send({do: 'remove', id: t.id}))")
             page.value(
                 f"send({{do: 'box', x: {box.x}, y: {box.y}, width: 36, height: 60, frame: 0}})"
             )
