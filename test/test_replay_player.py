@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Iterator
@@ -128,7 +129,7 @@ def test_answers_without_a_depth_topic_and_given_up() -> None:
     for stamp in (1, 2, 3):
         answers.sent_color(stamp)
     answers.answered(2)
-    assert answers.give_up() == [1, 3]
+    assert answers.give_up() == [3]  # 1 was passed over
     assert answers.unanswered == 2
     assert answers.wait(0.0, threading.Event())
 
@@ -222,25 +223,54 @@ def test_depth_far_behind_is_paired_as_the_tracker_pairs_it() -> None:
     assert all(pair.depth_stamp_ns == pair.stamp_ns for pair in paired)
 
 
+def test_what_a_tracker_has_passed_over_is_not_waited_for() -> None:
+    """Depth 900 ms late, and a tracker that does not wait for it and takes the newest image."""
+    clock = itertools.count()
+    answers = Answers(has_depth=True, now=lambda: float(next(clock)))
+    stamps = range(0, 3000 * MS, 33 * MS)
+    messages = [(at, Role.COLOR, at) for at in stamps]
+    messages += [(at + 900 * MS, Role.DEPTH, at) for at in stamps]
+    for number, (_, role, stamp) in enumerate(sorted(messages)):
+        if role is Role.COLOR:
+            answers.sent_color(stamp)
+            if number % 3 != 1:
+                answers.answered(stamp)
+        else:
+            answers.sent_depth(stamp)
+        assert len(answers._due) <= 1
+    answers.sent_all()
+    answers.answered(stamps[-1])
+    assert not answers._due
+    assert not answers._undecided
+    assert answers.unanswered > 10
+    assert answers.unanswered + len(answers.latencies_s) == len(stamps)
+    # Answered out of turn are those alone that were sent later.
+    answers = Answers(has_depth=False)
+    for stamp in (1, 2, 3):
+        answers.sent_color(stamp)
+    answers.answered(2)
+    assert list(answers._due) == [3]
+    assert answers.unanswered == 1
+
+
 def test_where_depth_has_stopped_lockstep_does_not_run_away() -> None:
     answers = Answers(has_depth=True)
     answers.sent_depth(0)
-    under_way, most = 0, 0
+    under_way: list[int] = []
+    most = 0
     lock = threading.Lock()
 
-    def answer_later(stamp_ns: int) -> None:
-        nonlocal under_way
-        answers.answered(stamp_ns)
+    def answer_next() -> None:
         with lock:
-            under_way -= 1
+            answers.answered(under_way.pop(0))
 
     for index in range(200):
         answers.sent_color(index * 33 * MS)
         with lock:
-            under_way += 1
-            most = max(most, under_way)
+            under_way.append(index * 33 * MS)
+            most = max(most, len(under_way))
         # As a tracker that has stopped waiting for depth.
-        threading.Timer(0.02, answer_later, [index * 33 * MS]).start()
+        threading.Timer(0.02, answer_next).start()
         assert answers.wait(5.0, threading.Event())
     assert most <= AHEAD + 2
     answers.sent_all()

@@ -10,6 +10,7 @@ ever overflows and a run does not depend on the machine's speed.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -24,6 +25,8 @@ from rgbd_kcf_tracker.recordings.pairing import (
 
 AHEAD = 30
 """Colour images that may be under way without being due: depth a second late, at 30 Hz."""
+AT_ONCE, PERIOD_S = 4, 1 / 30
+"""Of these so many go out at once, fewer than a tracker's subscription holds; then at 30 Hz."""
 REMEMBERED = 1024
 """Answers that are waited for at most when nobody answers at all."""
 
@@ -35,6 +38,10 @@ class Answers:
     stamps is known to be one only when later images have come, and to wait for its answer earlier
     would be to wait for ever. Where depth has stopped, the tracker gives up waiting for it by the
     wall clock, and :data:`AHEAD` holds the images back until then.
+
+    Answers come in the order of the images: one that a tracker has passed over (with
+    ``queue_policy`` newest it takes the newest that waits) is not waited for, and counts as
+    unanswered.
 
     Args:
         has_depth: without a depth topic each colour image is answered alone.
@@ -59,6 +66,8 @@ class Answers:
         self._changed = threading.Condition()
         self._due: dict[int, float] = {}
         self._early: dict[int, float] = {}
+        self._undecided: dict[int, float] = {}
+        self._reached = -math.inf
         self.pairs = 0
         self.latencies_s: list[float] = []
         self.unanswered = 0
@@ -66,10 +75,12 @@ class Answers:
     def sent_color(self, stamp_ns: int) -> None:
         """A colour image is about to go out."""
         with self._changed:
+            now = self._now()
             if self._has_depth:
-                self._expect(self._pairer.add_color(stamp_ns, self._now()))
+                self._undecided[stamp_ns] = now
+                self._expect(self._pairer.add_color(stamp_ns, now))
             else:
-                self._expect([Pair(stamp_ns, self._now(), None, None)])
+                self._expect([Pair(stamp_ns, now, None, None)])
 
     def sent_depth(self, stamp_ns: int) -> None:
         """A depth image is about to go out."""
@@ -85,15 +96,25 @@ class Answers:
         """The tracker has answered the colour image of this stamp."""
         with self._changed:
             sent = self._due.pop(stamp_ns, None)
+            self._changed.notify_all()
             if sent is not None:
                 self.latencies_s.append(self._now() - sent)
-                self._changed.notify_all()
             else:
-                self._changed.notify_all()
+                sent = self._undecided.get(stamp_ns)
                 # The tracker may decide sooner, when the depth image never arrived.
                 self._early[stamp_ns] = self._now()
                 while len(self._early) > REMEMBERED:
                     del self._early[next(iter(self._early))]
+            if sent is not None:
+                self._pass_over(sent)
+
+    def _pass_over(self, before: float) -> None:
+        """Wait no longer for what was sent before an image that has its answer."""
+        self._reached = max(self._reached, before)
+        passed = [stamp for stamp, sent in self._due.items() if sent < before]
+        for stamp in passed:
+            del self._due[stamp]
+        self.unanswered += len(passed)
 
     def wait(self, timeout_s: float, stop: Stopping) -> bool:
         """Wait until everything due is answered; False after ``timeout_s`` or when stopped.
@@ -107,7 +128,9 @@ class Answers:
                 if left <= 0 or stop.is_set():
                     return False
                 self._changed.wait(min(left, 0.1))
-            while self._undecided() > AHEAD and self._now() < deadline and not stop.is_set():
+            if self._under_way() > AT_ONCE and not stop.is_set():
+                self._changed.wait(min(PERIOD_S, timeout_s))
+            while self._under_way() > AHEAD and self._now() < deadline and not stop.is_set():
                 self._changed.wait(0.1)
         return True
 
@@ -128,15 +151,21 @@ class Answers:
             self.unanswered += len(stamps)
             return stamps
 
-    def _undecided(self) -> int:
-        return len(self._pairer.waiting_colors - self._early.keys())
+    def _under_way(self) -> int:
+        sent = self._undecided
+        waiting = self._pairer.waiting_colors - self._early.keys()
+        return sum(sent[stamp] >= self._reached for stamp in waiting)
 
     def _expect(self, pairs: Iterable[Pair[float, None]]) -> None:
         for pair in pairs:
             self.pairs += 1
+            self._undecided.pop(pair.stamp_ns, None)
             answered_at = self._early.pop(pair.stamp_ns, None)
             if answered_at is not None and answered_at >= pair.color:
                 self.latencies_s.append(answered_at - pair.color)
+                continue
+            if pair.color < self._reached:
+                self.unanswered += 1
                 continue
             self._due[pair.stamp_ns] = pair.color
             while len(self._due) > REMEMBERED:
