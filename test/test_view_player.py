@@ -474,3 +474,25 @@ def test_command_exports_and_refuses_to_replace(
     assert '--overwrite' in capsys.readouterr().err
     assert main(['view', '--seed', '3', '--host', '0.0.0.0']) == 2
     assert 'ssh -L' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        ('walk.mcap --scenario foo --export q.html', '--scenario means nothing with a SOURCE'),
+        ('walk.mcap --seed 0 --export q.html', '--seed means nothing with a SOURCE'),
+        ('--end 5', '--end means nothing without --export'),
+        ('--export q.html --port 80', '--port means nothing with --export'),
+        ('--export q.html --tolerance 1', '--tolerance means nothing without a SOURCE'),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(
+    words: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(['view', *words.split()]) == 2
+    assert message in capsys.readouterr().err

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import dataclasses
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.util import find_spec
@@ -100,16 +101,30 @@ def add_scene_options(parser: argparse.ArgumentParser, seed: int = 0) -> None:
     group.add_argument(
         '--scenario',
         metavar='NAME',
-        default='occlusion',
         help='what happens (default: occlusion; rgbd-kcf simulate --list names all)',
     )
     group.add_argument(
         '--seed',
         metavar='N',
         type=int,
-        default=seed,
         help=f'of everything random (default {seed})',
     )
+    parser.set_defaults(usual_seed=seed)
+
+
+def refuse(
+    args: argparse.Namespace, where: str, names: Sequence[str], cure: str = 'leave one of them out'
+) -> None:
+    """Options that mean nothing somewhere, rather than leaving them out silently.
+
+    Raises:
+        ParameterError: for one that was given.
+    """
+    for name in names:
+        value = getattr(args, name)
+        if value not in (None, [], '') and value is not False:  # 0 was given, too
+            option = '--' + name.replace('_', '-')
+            raise ParameterError(f'{option} means nothing {where}: {cure}')
 
 
 def open_source(args: argparse.Namespace) -> Recording:
@@ -117,14 +132,17 @@ def open_source(args: argparse.Namespace) -> Recording:
 
     Raises:
         RecordingError: where it cannot be opened.
-        ParameterError: for an unknown scene or a value that cannot be.
+        ParameterError: for an unknown scene, a value that cannot be, or an option of the other.
     """
     if args.source is None:
         from rgbd_kcf_tracker.view.sources import SimulatedRecording
 
-        return SimulatedRecording(args.scenario, args.seed)
+        _refuse_reading(args)
+        seed = args.usual_seed if args.seed is None else args.seed
+        return SimulatedRecording(args.scenario or 'occlusion', seed)
     from rgbd_kcf_tracker.recordings import open_recording
 
+    refuse(args, 'with a SOURCE', ('scenario', 'seed'))
     return open_recording(args.source, read_options(args))
 
 
@@ -146,6 +164,18 @@ def read_options(args: argparse.Namespace) -> ReadOptions:
         rectified=args.rectified,
         max_pixels=args.max_pixels,
     )
+
+
+def _refuse_reading(args: argparse.Namespace) -> None:
+    from rgbd_kcf_tracker.recordings import ReadOptions
+
+    given, usual = read_options(args), ReadOptions()
+    for field in dataclasses.fields(usual):
+        if getattr(given, field.name) != getattr(usual, field.name):
+            option = '--' + field.name.removesuffix('_s').replace('_', '-')
+            raise ParameterError(
+                f'{option} means nothing without a SOURCE: give one, or leave it out'
+            )
 
 
 def parse_box(text: str) -> Box:

@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.cli.common import (
     counter,
     open_source,
     parse_box,
+    refuse,
     tracker_parameters,
 )
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
@@ -53,11 +54,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--all', action='store_true', help='follow everyone in view too; only metric can'
     )
     page = parser.add_argument_group('page')
-    page.add_argument('--port', metavar='P', type=int, default=8080, help='TCP port (default 8080)')
+    page.add_argument('--port', metavar='P', type=int, help='TCP port (default 8080)')
     page.add_argument(
         '--host',
         metavar='ADDRESS',
-        default='127.0.0.1',
         help='address to listen on (default 127.0.0.1: this machine alone); others need a token',
     )
     page.add_argument(
@@ -94,7 +94,9 @@ def run(args: argparse.Namespace) -> int:
         from rgbd_kcf_tracker.view.player import Player
 
         player = Player(recording, variant, parameters, start=start, box=box, everyone=args.all)
-        serve(player, args.host, args.port, _token(args), args.open)
+        host = '127.0.0.1' if args.host is None else args.host
+        port = 8080 if args.port is None else args.port
+        serve(player, host, port, _token(args), args.open)
     return 0
 
 
@@ -123,7 +125,9 @@ def serve(player: object, host: str, port: int, token: str, open_it: bool) -> No
 def _check_export(args: argparse.Namespace) -> None:
     """Refuse what must not be written before anything is read."""
     if args.export is None:
+        refuse(args, 'without --export', ('end', 'overwrite'), 'add it, or leave this out')
         return
+    refuse(args, 'with --export', ('port', 'host', 'token', 'open'))
     from rgbd_kcf_tracker.recordings.outputs import check_outputs
 
     sources = [] if args.source is None else [args.source]
