@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,17 +15,20 @@ import numpy as np
 import pytest
 from mpl_toolkits.mplot3d import Axes3D
 
-from rgbd_kcf_tracker import Frame, Track, create_tracker
+from rgbd_kcf_tracker import Frame, Track, TrackState, create_tracker
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation import plot_style
+from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.thesis.correlation import linear_correlation, spectrum
 from rgbd_kcf_tracker.thesis.depth_patch import DepthPatch
 from rgbd_kcf_tracker.thesis.kcf import KcfModel
+from rgbd_kcf_tracker.view.explain import depth_pictures, metric_pictures
 from rgbd_kcf_tracker.view.explain.book import explain
 from rgbd_kcf_tracker.view.explain.circulant import block_circulant, circulant, permutation
+from rgbd_kcf_tracker.view.explain.moments import explain_depth
 from rgbd_kcf_tracker.view.explain.page import Chapter, equation, write_page
 from rgbd_kcf_tracker.view.explain.picture import Picture, show_mesh
 from rgbd_kcf_tracker.view.sources import SimulatedRecording, first_box
@@ -236,6 +240,44 @@ def test_what_a_recording_does_not_show_is_said() -> None:
     assert not any(p.figure == '4.5' for p in chapter.pictures)
 
 
+def test_what_is_said_of_a_difference_is_what_the_numbers_say() -> None:
+    start, box = first_box(recording(), None)
+    seen = explain_depth(enumerate(recording().frames(start), start), box, ASKED).seen
+    call = depth_pictures._compared(seen)
+    assert seen is not None
+    assert call is not None
+    for value, nearer, farther, words in (
+        (0.108, 0.056, 0.2, 'What is left is flat'),
+        (0.323, 0.016, 0.6, 'lies farther away'),
+        (0.4, 0.2, 0.1, 'the response says'),
+        (0.4, 0.01, 0.8, 'the response says'),
+    ):
+        measured = replace(call.value, value=value, nearer=nearer, farther=farther)
+        picture = depth_pictures._difference(seen, replace(call, value=measured), '4.4', 'without')
+        assert words in picture.words
+        assert ('flat' in picture.words) == (value < 0.15)
+
+
+def test_hills_are_said_to_sink_only_where_they_do() -> None:
+    assert 'the lower the hill' in depth_pictures._of_the_hills([0.9, 0.5, 0.2])
+    assert 'the lower the hill' not in depth_pictures._of_the_hills([0.34, 0.32, 0.41])
+    assert 'the lower the hill' not in depth_pictures._of_the_hills([0.34, 0.34])
+    assert depth_pictures._of_the_hills([0.34]) == ''
+
+
+def test_a_frame_without_candidates_has_no_empty_axes(
+    monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder
+) -> None:
+    drawn = []
+    monkeypatch.setattr(plot_style, 'png', lambda figure: drawn.append(figure) or b'')
+    hidden = (ASKED, frames()[-1], Track(None, TrackState.OCCLUDED), Insight())
+    picture = metric_pictures._candidates(hidden)
+    assert 'Every silhouette of this frame is surely' in picture.words
+    assert not picture.equation
+    assert len(drawn[0].axes) == 1
+    assert not recwarn.list
+
+
 def test_frame_before_the_target_is_refused() -> None:
     start, box = first_box(recording(), None)
     with pytest.raises(ParameterError, match='--frame 0'):
@@ -263,6 +305,11 @@ def test_equations_take_the_colour_of_the_page() -> None:
     assert '#ffffff' not in svg
 
 
+def test_a_sign_that_leans_out_of_its_sheet_is_not_cut() -> None:
+    """Matplotlib gives P 7 points, of which it needs 7.5: cut there, it reads as F."""
+    assert 'overflow="visible"' in equation('P').partition('>')[0]
+
+
 def test_command_explains_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from rgbd_kcf_tracker.recordings import SequenceWriter
 
@@ -279,3 +326,7 @@ def test_command_explains_a_recording(tmp_path: Path, capsys: pytest.CaptureFixt
     assert '--overwrite' in capsys.readouterr().err
     assert main([*command, '--variants', 'mosse', '--overwrite']) == 2
     assert 'mosse' in capsys.readouterr().err
+    assert main([*command, '--variants', ',', '--overwrite']) == 2
+    assert 'no trackers: give --variants' in capsys.readouterr().err
+    assert main([*command, '--seed', '0', '--overwrite']) == 2
+    assert '--seed means nothing with a SOURCE' in capsys.readouterr().err

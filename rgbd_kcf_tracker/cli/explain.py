@@ -68,6 +68,8 @@ def run(args: argparse.Namespace) -> int:
             raise ParameterError(
                 f'unknown variant {name!r} in --variants: choose from {", ".join(VARIANTS)}'
             )
+    if not variants:
+        raise ParameterError(f'no trackers: give --variants some of {", ".join(VARIANTS)}')
     folder = Path(args.output)
     check_outputs(
         {'--output': folder},

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -182,14 +183,21 @@ def _difference(moment: Moment, call: Call, number: str, word: str) -> Picture:
         low=0, high=0.5, axes_label='samples',
     )  # fmt: skip
     hidden = moment.track.state is not TrackState.TRACKING
-    threshold = RgbdParameters().depth_threshold
+    threshold = _DEFAULTS.depth_threshold
     what = (
         f'After adjusting, a difference of {result.value:.3f} m is left on average, of which '
         f'{abs(result.nearer):.3f} m is nearer than the target was; the threshold is '
         f'{threshold:g} m.'
     )
     verdict = 'What is left is flat: nothing has come in front, and the target counts as seen.'
-    if hidden and result.nearer >= threshold:
+    if not hidden and (result.nearer >= threshold or result.farther > _DEFAULTS.gone_share):
+        verdict = 'By its depth it would be hidden, but the response says that it is the target.'
+    elif not hidden and result.value >= threshold:
+        verdict = (
+            'What is left lies farther away, which hides nothing: nothing has come in front, and '
+            'the target counts as seen.'
+        )
+    elif hidden and result.nearer >= threshold:
         verdict = (
             'The difference reaches the middle of the patch, which no cutting at the edges '
             'removes: something has come in front, and there is no box.'
@@ -304,7 +312,7 @@ def _correlations(moment: Moment) -> Picture:
 def _responses(shown: list[tuple[str, Moment]]) -> Picture:
     figure = plot_style.figure(3.3 * len(shown), 5.6)
     values: dict[str, Any] = {}
-    peaks = []
+    peaks: list[float] = []
     for index, (word, moment) in enumerate(shown):
         search = moment.of(_SEARCH)[0]
         response = search.found['responses'][search.found['index']]
@@ -324,10 +332,13 @@ def _responses(shown: list[tuple[str, Moment]]) -> Picture:
             high=1.0,
         )  # fmt: skip
         values[f'response_{word.replace(" ", "_")}'] = response
-        peaks.append(f'{best.response:.2f} when {word}')
+        peaks.append(round(float(best.response), 2))  # as it is shown
+    words = ', '.join(
+        f'{peak:.2f} when {word}' for peak, (word, _) in zip(peaks, shown, strict=True)
+    )
     return Picture(
         '4.11', 'responses', 'The response of a target that is visible, partly hidden, and hidden',
-        f'The highest response is {", ".join(peaks)}: the more is hidden, the lower the hill. '
+        f'The highest response is {words}{_of_the_hills(peaks)}. '
         'The dashed box is where the best patch lies; above '
         f'{_DEFAULTS.detect_threshold:g} it is the target whatever the depth says, below that '
         'the depth is asked.',
@@ -340,6 +351,15 @@ def _responses(shown: list[tuple[str, Moment]]) -> Picture:
             'alpha',
         ),
     )  # fmt: skip
+
+
+def _of_the_hills(peaks: list[float]) -> str:
+    """What the heights tell of how much is hidden, the least hidden first."""
+    if len(peaks) < 2:
+        return ''
+    if all(a > b for a, b in itertools.pairwise(peaks)):
+        return ': the more is hidden, the lower the hill'
+    return ': here the height of the hill does not say how much is hidden'
 
 
 def _over_time(moments: DepthMoments) -> Picture:

@@ -152,8 +152,8 @@ def _tinted(labels: Array) -> Array:
 def _candidates(seen: _Seen) -> Picture:
     number, frame, track, insight = seen
     shown = insight.considered[:_SHOWN]
-    figure = plot_style.figure(9.5, 4.4)
-    axes = figure.subplots(1, 2, width_ratios=(1.2, 1))
+    figure = plot_style.figure(*((9.5, 4.4) if shown else (5.2, 3.3)))
+    axes = figure.subplots(1, 2, width_ratios=(1.2, 1)) if shown else [figure.subplots()]
     show_image(
         axes[0], rgb(frame), f'frame {number}: {_count(len(insight.considered), "candidate")}'
     )
@@ -164,10 +164,10 @@ def _candidates(seen: _Seen) -> Picture:
         draw_box(axes[0], one.box, palette[index % len(palette)], f'{index + 1}: {_percent(one)}')
     axes[0].set_xlim(-0.5, frame.width - 0.5)
     axes[0].set_ylim(frame.height - 0.5, -0.5)
-    legend(axes[0])
     values: dict[str, Any] = {'probability': [c.probability for c in insight.considered]}
     shown_cues: list[str] = []
     if shown:
+        legend(axes[0])
         names = shown_cues = [
             name for name in shown[0].cues if any(abs(c.cues[name]) > 0.005 for c in shown)
         ]
@@ -190,6 +190,18 @@ def _candidates(seen: _Seen) -> Picture:
             fontsize=8, frameon=False, loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=2
         )
         plot_style.tidy(axes[1])
+    if not shown:
+        verdict = (
+            'No box is given, and the target counts as hidden.'
+            if track.box is None
+            else 'The box is that of the look alone.'
+        )
+        return Picture(
+            '', 'candidates', 'No silhouette that could be the target',
+            'Every silhouette of this frame is surely somebody else or the room, so there is none '
+            f'to weigh. {verdict}',
+            '', tuple(map(name_of, COMPUTED_BY['considered'])), plot_style.png(figure), values,
+        )  # fmt: skip
     verdict = 'nothing was taken' if track.box is None else 'the first was taken'
     return Picture(
         '', 'candidates', 'Silhouettes, and what speaks for each',
