@@ -459,6 +459,8 @@ def test_the_command_lists_what_failed_and_goes_on(scenes: Path, tmp_path: Path,
         (['sim:normal', '--jobs', '0'], '--jobs is 0'),
         (['sim:normal', '--rate', '0'], '--rate is 0 Hz'),
         (['sim:normal', '--size', 'big'], '--size'),
+        (['sim:normal', '--size', '16x16'], 'size is 16x16: give 64x48'),
+        (['sim:normal', '--duration', '-1'], 'duration is -1 s'),
         (['sim:normal', '--seeds', 'x'], 'seeds'),
         (['sim:normal', '--boxes', 'x'], 'NAME=FOLDER'),
         (['sim:normal', '--eao-lengths', '9-3'], '--eao-lengths'),
@@ -471,6 +473,36 @@ def test_bad_options_are_told_without_a_traceback(words, message, tmp_path: Path
     error = capsys.readouterr().err
     assert message in error
     assert 'Traceback' not in error
+    assert not (tmp_path / 'r').exists()
+
+
+def test_a_folder_in_which_nothing_was_measured_goes_if_it_was_made_for_it(
+    scenes: Path, tmp_path: Path, capsys
+):
+    for name in ('walk_1', 'walk_2'):
+        (scenes / name / 'groundtruth.txt').write_text('1,1,5,5\n')
+    words = ['evaluate', str(scenes), '--variants', 'kcf', '--jobs', '1', '--report']
+    assert main([*words, str(tmp_path / 'new')]) == 2
+    error = capsys.readouterr().err
+    assert all(name in error for name in ('nothing was measured', 'walk_1', 'walk_2'))
+    assert not (tmp_path / 'new').exists()
+    (tmp_path / 'old').mkdir()
+    assert main([*words, str(tmp_path / 'old')]) == 2
+    assert (tmp_path / 'old' / 'failures.txt').exists()
+
+
+def test_options_that_change_the_data_stand_in_the_report(scenes: Path, tmp_path: Path):
+    report = tmp_path / 'report'
+    code = main([
+        'evaluate', str(scenes), 'sim:normal', '--variants', 'kcf', '--jobs', '1', '--kind',
+        'folder', '--sequences', 'walk_1,normal', '--scenarios', 'normal', '--fps', '20',
+        '--rate', '5', '--duration', '0.8', '--size', '320x180', '--report', str(report),
+    ])  # fmt: skip
+    assert code == 0
+    options = json.loads((report / 'report.json').read_text())['options']
+    for word in ('folder', 'named walk_1,normal', 'scenarios normal', '20 Hz', '5 Hz', '0.8 s'):
+        assert word in options
+    assert options in (report / 'index.html').read_text()
 
 
 def test_a_report_folder_that_cannot_be_written(scenes: Path, tmp_path: Path, capsys):

@@ -6,19 +6,23 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rgbd_kcf_tracker.cli.common import parse_intrinsics
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
-from rgbd_kcf_tracker.cli.workers import NOTICE, Progress, open_workers, record
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.cli.workers import NOTICE, RECORD, Progress, open_workers, record
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 
+DEFAULT_FPS = 30.0
 EXIT_FAILURES = 1
 """Exit code where the report was written but some runs failed."""
+_BEFORE_RESULTS = {RECORD, 'failures.txt', 'per_frame.csv'}
+"""What a report folder holds before the first result."""
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
@@ -39,7 +43,7 @@ def add_data_options(parser: argparse.ArgumentParser) -> None:
         '--sequences', metavar='A,B', help='only sequences whose name holds one of these'
     )
     group.add_argument(
-        '--fps', type=float, default=30.0, metavar='F',
+        '--fps', type=float, default=DEFAULT_FPS, metavar='F',
         help='rate of folders that do not state theirs (default 30)',
     )  # fmt: skip
     group.add_argument(
@@ -165,6 +169,14 @@ def _needs(sequences: Sequence[Benchmark], contenders: Sequence[Contender]) -> l
 def in_words(args: argparse.Namespace) -> str:
     """What is other than usual, for the head of a report."""
     parts = []
+    if args.kind != 'auto':
+        parts.append(f'read as {args.kind}')
+    if args.sequences is not None:
+        parts.append(f'only sequences named {args.sequences}')
+    if args.scenarios is not None:
+        parts.append(f'only the scenarios {args.scenarios}')
+    if args.fps != DEFAULT_FPS:
+        parts.append(f'{args.fps:g} Hz where a folder states none')
     if args.rate is not None:
         parts.append(f'{args.rate:g} Hz')
     if args.no_depth:
@@ -173,6 +185,8 @@ def in_words(args: argparse.Namespace) -> str:
         parts.append(f'camera {args.intrinsics}')
     if any(text.startswith('sim:') for text in args.dataset):
         parts.append(f'seeds {args.seeds} where none are given, {args.size}')
+        if args.duration is not None:
+            parts.append(f'scenes of {args.duration:g} s')
     parts.extend(args.param)
     return ', '.join(parts) or 'none'
 
@@ -220,7 +234,27 @@ def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None
         )
 
 
-def make_report_folder(folder: Path) -> None:
+@contextlib.contextmanager
+def report_folder(folder: Path) -> Iterator[None]:
+    """A folder for a report; one made here goes where an error leaves no result in it.
+
+    Raises:
+        RecordingError: where it cannot be written.
+    """
+    made = not folder.exists()
+    _make_report_folder(folder)
+    try:
+        yield
+    except RgbdKcfError:
+        with contextlib.suppress(OSError):
+            if made and set(os.listdir(folder)) <= _BEFORE_RESULTS:
+                for name in _BEFORE_RESULTS:
+                    (folder / name).unlink(missing_ok=True)
+                folder.rmdir()
+        raise
+
+
+def _make_report_folder(folder: Path) -> None:
     """Make a folder for a report.
 
     Raises:

@@ -17,12 +17,12 @@ from rgbd_kcf_tracker.cli.benchmarks import (
     distinct,
     end,
     in_words,
-    make_report_folder,
+    report_folder,
     run_jobs,
     run_options,
     words,
 )
-from rgbd_kcf_tracker.cli.common import add_overwrite_option, parse_assignments, progress
+from rgbd_kcf_tracker.cli.common import add_overwrite_option, parse_assignments, progress, refuse
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.workers import WORKER_OPTIONS, add_worker_options, record, shard_of
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.extras import require
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.contenders import Contender
+    from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
     from rgbd_kcf_tracker.evaluation.parts import Whole
     from rgbd_kcf_tracker.evaluation.report import Heading
 
@@ -134,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.dataset:
         raise ParameterError('no data: give DATASET, or --merge DIR... to join parts')
     if args.everyone:
-        _refuse(args, '--everyone', ('short_term', 'eao_lengths', 'export'))
+        refuse(args, 'with --everyone', ('short_term', 'eao_lengths', 'export'))
     check_report(args.report, args.dataset, args.overwrite)
     if args.identity:
         return _identity(args)
@@ -143,20 +144,19 @@ def run(args: argparse.Namespace) -> int:
     read = data_options(args, everyone=args.everyone or args.identity)
     sequences = distinct([s for text in args.dataset for s in open_dataset(text, read)])
     options = run_options(args, args.short_term, args.fresh)
-    make_report_folder(args.report)
-
     shard = shard_of(args)
     own = sequences if shard is None else shard.of(sequences)
-    own, contenders, failures = run_jobs(args, own, contenders, options)
-    heading = _heading(args, ablated, eao_lengths)
-    whole = Whole(own, contenders, options, heading, failures, tuple(args.export), args.everyone)
-    if shard is not None:
-        write_part(args.report, shard, [s.name for s in sequences], whole)
-        print(
-            f'part {shard}: {len(own)} of {len(sequences)} sequences; join all parts with --merge'
+    with report_folder(args.report):
+        own, contenders, failures = run_jobs(args, own, contenders, options)
+        heading = _heading(args, ablated, eao_lengths)
+        whole = Whole(
+            own, contenders, options, heading, failures, tuple(args.export), args.everyone
         )
-        return end(failures)
-    return _report(args.report, whole)
+        if shard is None:
+            return _report(args.report, whole)
+        write_part(args.report, shard, [s.name for s in sequences], whole)
+    print(f'part {shard}: {len(own)} of {len(sequences)} sequences; join all parts with --merge')
+    return end(failures)
 
 
 def _merge(args: argparse.Namespace) -> int:
@@ -166,10 +166,10 @@ def _merge(args: argparse.Namespace) -> int:
     if args.dataset:
         raise ParameterError('--merge takes the folders of parts alone: their data is known')
     check_report(args.report, (), args.overwrite)
-    make_report_folder(args.report)
-    whole = join(args.merge, args.report)
-    record(args.report, 'parts joined', parts=[str(place) for place in args.merge])
-    return _report(args.report, whole)
+    with report_folder(args.report):
+        whole = join(args.merge, args.report)
+        record(args.report, 'parts joined', parts=[str(place) for place in args.merge])
+        return _report(args.report, whole)
 
 
 def _report(folder: Path, whole: Whole) -> int:
@@ -197,25 +197,22 @@ def _report(folder: Path, whole: Whole) -> int:
     return end(whole.failures)
 
 
-def _refuse(args: argparse.Namespace, mode: str, names: Sequence[str]) -> None:
-    """Options that mean nothing in a mode, rather than leaving them out silently."""
-    for name in names:
-        if getattr(args, name):
-            option = '--' + name.replace('_', '-')
-            raise ParameterError(f'{option} means nothing with {mode}: leave one of them out')
-
-
 def _identity(args: argparse.Namespace) -> int:
-    from rgbd_kcf_tracker.evaluation import identity
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
+
+    options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'fresh', *WORKER_OPTIONS)
+    refuse(args, 'with --identity', (*options, 'short_term', 'eao_lengths', 'export'))
+    read = data_options(args, everyone=args.everyone or args.identity)
+    sequences = distinct([s for text in args.dataset for s in open_dataset(text, read)])
+    with report_folder(args.report):
+        return _compare(args, sequences)
+
+
+def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
+    from rgbd_kcf_tracker.evaluation import identity
     from rgbd_kcf_tracker.evaluation.jobs import Failure, as_asked
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_identity_report
 
-    options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'fresh', *WORKER_OPTIONS)
-    _refuse(args, '--identity', (*options, 'short_term', 'eao_lengths', 'export'))
-    read = data_options(args, everyone=args.everyone or args.identity)
-    sequences = distinct([s for text in args.dataset for s in open_dataset(text, read)])
-    make_report_folder(args.report)
     seen, failures = [], []
     for sequence in sequences:
         try:

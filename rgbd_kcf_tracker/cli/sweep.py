@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.cli.benchmarks import (
     distinct,
     end,
     in_words,
-    make_report_folder,
+    report_folder,
     run_jobs,
     run_options,
 )
@@ -120,46 +120,45 @@ def run(args: argparse.Namespace) -> int:
     tried, held = _split(args)
     shard = shard_of(args)
     options = run_options(args)
-    make_report_folder(args.report)
-
-    every = [default, *settings]
-    if shard is not None:
-        own = shard.of(tried)
-        _, _, failures = run_jobs(args, own, [s.contender for s in every], options)
-        print(
-            f'part {shard}: {len(own)} of {len(tried)} sequences; bring the folders of all parts '
-            'together, and run once more without --shard'
+    with report_folder(args.report):
+        every = [default, *settings]
+        if shard is not None:
+            own = shard.of(tried)
+            _, _, failures = run_jobs(args, own, [s.contender for s in every], options)
+            print(
+                f'part {shard}: {len(own)} of {len(tried)} sequences; bring the folders of all '
+                'parts together, and run once more without --shard'
+            )
+            return end(failures)
+        tried, _, failures = run_jobs(args, tried, [s.contender for s in every], options)
+        if interrupts.asked:  # nothing can be said before all settings have run
+            return end(failures)
+        scores = sweep_tables.scores(args.report, tried, every, options, args.measure)
+        sign = -1.0 if args.measure in sweep_tables.SMALLER_IS_BETTER else 1.0
+        finalists = sweep_tables.best(scores, args.finalists, sign)
+        last = [default, *(settings[i] for i in finalists)]
+        held, _, more = run_jobs(args, held, [s.contender for s in last], options)
+        failures += more
+        if interrupts.asked:
+            return end(failures)
+        found = sweep_tables.Found(
+            args.measure,
+            tuple(axis for axis in axes if not axis.fixed),
+            args.search == 'grid',
+            default,
+            tuple(settings),
+            scores,
+            finalists,
+            sweep_tables.scores(args.report, held, last, options, args.measure),
         )
+        words = f'{in_words(args)}; {args.search} search, seed {args.seed}'
+        heading = Heading((*args.dataset, f'held out: {args.held_out}'), words)
+        frames = sweep_tables.frames(args.report, [*tried, *held])
+        tables = write_sweep_report(args.report, found, failures, heading, frames)
+        for table in tables[:2]:
+            print(f'{table.text()}\n')
+        print(f'report: {args.report / PAGE}')
         return end(failures)
-    tried, _, failures = run_jobs(args, tried, [s.contender for s in every], options)
-    if interrupts.asked:  # nothing can be said before all settings have run
-        return end(failures)
-    scores = sweep_tables.scores(args.report, tried, every, options, args.measure)
-    sign = -1.0 if args.measure in sweep_tables.SMALLER_IS_BETTER else 1.0
-    finalists = sweep_tables.best(scores, args.finalists, sign)
-    last = [default, *(settings[i] for i in finalists)]
-    held, _, more = run_jobs(args, held, [s.contender for s in last], options)
-    failures += more
-    if interrupts.asked:
-        return end(failures)
-    found = sweep_tables.Found(
-        args.measure,
-        tuple(axis for axis in axes if not axis.fixed),
-        args.search == 'grid',
-        default,
-        tuple(settings),
-        scores,
-        finalists,
-        sweep_tables.scores(args.report, held, last, options, args.measure),
-    )
-    words = f'{in_words(args)}; {args.search} search, seed {args.seed}'
-    heading = Heading((*args.dataset, f'held out: {args.held_out}'), words)
-    frames = sweep_tables.frames(args.report, [*tried, *held])
-    tables = write_sweep_report(args.report, found, failures, heading, frames)
-    for table in tables[:2]:
-        print(f'{table.text()}\n')
-    print(f'report: {args.report / PAGE}')
-    return end(failures)
 
 
 def _split(args: argparse.Namespace) -> tuple[list[Benchmark], list[Benchmark]]:

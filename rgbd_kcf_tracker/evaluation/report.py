@@ -318,5 +318,6 @@ def _write_failures(path: Path, failures: Sequence[Failure]) -> None:
 
 def _why_nothing(failures: Sequence[Failure]) -> str:
     if failures:
-        return f'nothing was measured: {failures[0].sequence}: {failures[0].reason}'
+        each = dict.fromkeys(f'{f.sequence}: {f.reason}' for f in failures)
+        return f'nothing was measured: {"; ".join(each)}'
     return 'nothing was measured: none of the sequences has ground truth'

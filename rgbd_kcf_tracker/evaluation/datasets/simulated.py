@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sequence,
 )
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE
-from rgbd_kcf_tracker.simulation import SCENARIOS, expand_names, simulate
+from rgbd_kcf_tracker.simulation import SCENARIOS, check_request, expand_names, simulate
 
 PREFIX = 'sim:'
 
@@ -46,6 +46,7 @@ def find(
 
     Raises:
         DatasetError: for an unknown scenario or a seed that is no number.
+        ParameterError: for a rate, length or size that no scene can have.
     """
     names, _, seed_text = text.removeprefix(PREFIX).partition(':')
     chosen = expand_names(name.strip() for name in names.split(','))
@@ -56,6 +57,11 @@ def find(
             )
     if scenarios:
         chosen = [name for name in chosen if name in scenarios]
+    found = [
+        (name, seed) for name in chosen for seed in (parse_seeds(seed_text) if seed_text else seeds)
+    ]
+    for name, seed in found:  # every mistake before anything is run
+        check_request(name, seed, rate_hz, duration_s, size)
     return [
         Sequence(
             name=f'{name}/{seed}',
@@ -66,8 +72,7 @@ def find(
             ),
             identity=f'sim:{name}:{seed}:{rate_hz}:{duration_s}:{size}',
         )
-        for name in chosen
-        for seed in (parse_seeds(seed_text) if seed_text else seeds)
+        for name, seed in found
     ]
 
 
