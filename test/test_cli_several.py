@@ -143,3 +143,10 @@ def test_boxes_are_drawn_with_a_colour_for_each_id():
     assert tuple(drawn[180 - 1, 130]) == id_color(1)
     assert not image.any(), 'the picture is left as it is'
     assert len({id_color(who) for who in range(20)}) == 20
+
+
+def test_an_id_at_the_top_edge_stands_below_the_bar():
+    image = np.full((480, 640, 3), 90, np.uint8)
+    drawn = draw_tracks(image, {5: Track(Box(300, -20, 90, 200), TrackState.TRACKING, 1.0)})
+    colored = (drawn[:, 310] == id_color(5)).all(axis=1)
+    assert np.count_nonzero(colored) > 10, 'the patch of the id, as bright as it was drawn'

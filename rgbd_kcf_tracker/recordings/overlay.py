@@ -106,12 +106,12 @@ def _label(
     scale: float,
     thickness: int,
 ) -> None:
-    """Words on a patch of the colour in the upper left corner of what shows of the box."""
+    """Words on a patch of the colour, at the upper left of what shows of the box below the bar."""
     shown = box.clipped(image.shape[1], image.shape[0])
     if shown is None:
         return
     (width, height), _ = cv2.getTextSize(words, _FONT, scale, 1)
-    left, top = round(shown.x), round(shown.y)
+    left, top = round(shown.x), max(round(shown.y), _bar_height(image, scale))
     right, bottom = left + width + 2 * thickness + 2, top + height + 2 * thickness + 4
     cv2.rectangle(image, (left, top), (right, bottom), color, -1)
     at = left + thickness + 1, bottom - thickness - 2
@@ -134,6 +134,15 @@ def _words(track: Track) -> str:
     return words
 
 
+def _bar_height(image: npt.NDArray[np.uint8], scale: float) -> int:
+    (_, text_height), _ = cv2.getTextSize('Ag', _FONT, scale, _weight(scale))
+    return int(min(round(text_height * 2.1), image.shape[0]))
+
+
+def _weight(scale: float) -> int:
+    return 2 if scale > 0.8 else 1
+
+
 def _bar(
     image: npt.NDArray[np.uint8],
     words: str,
@@ -141,9 +150,9 @@ def _bar(
     scale: float,
     color: tuple[int, int, int],
 ) -> None:
-    weight = 2 if scale > 0.8 else 1
+    weight = _weight(scale)
     (_, text_height), _ = cv2.getTextSize('Ag', _FONT, scale, weight)
-    height = min(round(text_height * 2.1), image.shape[0])
+    height = _bar_height(image, scale)
     bar = image[:height]
     np.multiply(bar, 1 - _BAR, out=bar, casting='unsafe')
     baseline = round((height + text_height) / 2)
