@@ -35,7 +35,7 @@ class Box:
         for name in ('x', 'y', 'width', 'height'):
             value = float(getattr(self, name))
             if not math.isfinite(value):
-                raise BoxError(f'box {name} is {value}: give four finite numbers x,y,width,height')
+                raise BoxError(f'box {name} is {value}: it must be finite')
             object.__setattr__(self, name, value)
         if self.width <= 0 or self.height <= 0:
             raise BoxError(

@@ -237,6 +237,8 @@ def test_trackers_of_another_name_are_pointed_out(
         ({'rate': 'fast'}, "parameter rate is 'fast': it must be a number"),
         ({'speed': 1.0}, "unknown parameter 'speed'"),
         ({'bag': 'BAG', 'topics': '/nothing'}, 'has no topic /nothing'),
+        ({'bag': 'BAG', 'topics': ['/color/image', '/nothing']}, 'has no topic /nothing.'),
+        ({'bag': 'BAG', 'color_topic': '/nope'}, 'give another as -p color_topic:=TOPIC'),
         ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 0.0}, 'ends before start'),
     ],
 )

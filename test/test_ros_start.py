@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE
 
 pytestmark = pytest.mark.ros
 
+DOCS = Path(__file__).resolve().parent.parent / 'docs'
 MAINS = {
     'tracker': tracker_main.main,
     'replay': replay_main.main,
@@ -92,6 +93,7 @@ def test_what_cannot_be_understood_is_refused(
         ('pair_tolerance:="soon"', 'pair_tolerance'),
         ('variant:=3', 'variant'),
         ('init_box:="1,2,3"', 'give x,y,width,height'),
+        ('init_box:="nan,2,3,4"', 'box x is nan: it must be finite: give x,y,width,height'),
         (
             'qos_overrides./color/image.subscription.reliability:=magic',
             'Unexpected QoS override',
@@ -103,6 +105,15 @@ def test_a_tracker_refuses_wrong_parameters(
 ) -> None:
     assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures('_process')
+def test_the_manual_quotes_what_is_said(capfd: pytest.CaptureFixture[str]) -> None:
+    manual = (DOCS / 'troubleshooting.md').read_text(encoding='utf-8')
+    for arguments in ('variatn:=kcf', 'kcf.learning_rate:=7.5'):
+        assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
+        line = capfd.readouterr().err.splitlines()[-1]
+        assert f'`{line.removeprefix("tracker: ")}`' in manual
 
 
 @pytest.mark.usefixtures('_process')

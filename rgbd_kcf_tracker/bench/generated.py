@@ -96,8 +96,9 @@ def parameters_markdown() -> str:
         'A parameter is set on the command line (`--ros-args -p NAME:=VALUE`), in a file '
         '(`--params-file`; `config/tracker.yaml` has all of them) or, unless it is marked '
         'read-only, while the node runs (`ros2 param set /tracker NAME VALUE`). An integer is '
-        'taken for a double. A value that is out of range leaves the default, with an error in the '
-        'log and in `/diagnostics`; while running it is refused with the reason.',
+        'taken for a double. With an unknown name or a value out of range the node does not start '
+        "and says why (`unknown parameter 'variatn': did you mean 'variant'?`); while running it "
+        'is refused with the reason.',
         '',
         'A change of `variant` or of a parameter of the variant at work makes a new tracker on the '
         'box of the next frame that has one, so a hidden target is not lost by it. '

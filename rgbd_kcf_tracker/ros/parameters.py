@@ -151,13 +151,13 @@ def coerced(info: ParameterInfo, value: object) -> Scalar:
     Raises:
         ParameterError: where it is no such value or out of range.
     """
+    # Both name several things: ROS users write them as lists, too.
+    if info.name in ('init_box', 'topics') and not isinstance(value, str):
+        value = ','.join(map(str, value)) if isinstance(value, Iterable) else value
+    value = checked(info, value)
     if info.name == 'init_box':
-        if not isinstance(value, str) and isinstance(value, Iterable):
-            value = ','.join(repr(v) for v in value)
-        value = checked(info, value)
         parse_box(str(value))
-        return value
-    return checked(info, value)
+    return value
 
 
 def descriptor(info: ParameterInfo) -> ParameterDescriptor:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import json
 import os
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -68,9 +69,13 @@ class ReplayNode(Node):
         parameters = self.parameters
         if not parameters.bag:
             raise ParameterError('no recording given: set the parameter bag, as in -p bag:=FILE')
-        with ReplaySource(Path(parameters.bag), parameters) as source:
+        try:
+            source = ReplaySource(Path(parameters.bag), parameters)
+        except RecordingError as error:
+            raise RecordingError(as_parameters(str(error))) from None
+        with source:
             for warning in source.warnings:
-                self.get_logger().warning(warning)
+                self.get_logger().warning(as_parameters(warning))
             self._advertise(source)
             answers = Answers(source.depth_topic is not None, parameters.pair_tolerance)
             if parameters.answer_topic and source.color_topic is not None:
@@ -202,6 +207,12 @@ class ReplayNode(Node):
     def _tick(self, time_ns: int) -> None:
         if self._clock_publisher is not None:
             self._clock_publisher.publish(Clock(clock=stamp_from_ns(time_ns)))
+
+
+def as_parameters(text: str) -> str:
+    """What the readers say of options of the command line, in the node's parameters."""
+    text = re.sub(r'--(color|depth|info)-topic (/\S+|none)', r'-p \1_topic:=\2', text)
+    return re.sub(r'--(color|depth|info)-topic', r'-p \1_topic:=TOPIC', text)
 
 
 def message_class(name: str) -> Any | None:
