@@ -145,12 +145,14 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
     return cast(Scalar, value)
 
 
-def parsed(info: ParameterInfo, text: str) -> Scalar:
-    """The value that ``text`` (from a command line) gives the parameter.
+def parsed(info: ParameterInfo, text: Scalar) -> Scalar:
+    """The value that ``text`` (from a command line) gives the parameter; no text is checked alone.
 
     Raises:
         ParameterError: where the text is no such value.
     """
+    if not isinstance(text, str):
+        return checked(info, text)
     if info.type is bool:
         lowered = text.strip().lower()
         if lowered not in ('true', 'false'):
@@ -166,8 +168,8 @@ def parsed(info: ParameterInfo, text: str) -> Scalar:
         ) from None
 
 
-def with_overrides(parameters: T, overrides: Mapping[str, str]) -> T:
-    """A copy of ``parameters`` with values given as text, as in ``--param key=value``.
+def with_overrides(parameters: T, overrides: Mapping[str, Scalar]) -> T:
+    """A copy of ``parameters`` with values given, as text too, as in ``--param key=value``.
 
     Raises:
         ParameterError: for an unknown name or a bad value.

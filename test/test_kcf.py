@@ -16,8 +16,10 @@ from rgbd_kcf_tracker import Box, Frame, RgbdKcfError, TrackState, create_tracke
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation import otb_reference
 from rgbd_kcf_tracker.features.windows import bordered
+from rgbd_kcf_tracker.parameters import with_overrides
 from rgbd_kcf_tracker.thesis.kcf import KcfParameters, WindowGeometry
 from rgbd_kcf_tracker.thesis.window import gray_window
+from rgbd_kcf_tracker.variants import default_parameters
 
 
 def texture(height: int, width: int, seed: int, blur: float = 2.0) -> npt.NDArray[np.uint8]:
@@ -212,6 +214,15 @@ def test_parameters_are_checked() -> None:
         KcfParameters(padding=-1.0)
     with pytest.raises(ParameterError, match='kernel'):
         KcfParameters(kernel='cubic')
+
+
+def test_values_given_by_name_are_checked_as_they_are() -> None:
+    for value in (100.7, 1.5, '100.7', True):
+        with pytest.raises(ParameterError, match='particles'):
+            with_overrides(default_parameters('metric'), {'particles': value})
+    for good in (100, '100'):
+        changed = with_overrides(default_parameters('metric'), {'particles': good})
+        assert changed == default_parameters('metric').replace(particles=100)
 
 
 def test_published_precision_is_reached_on_recorded_sequences(
