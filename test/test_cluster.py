@@ -284,7 +284,7 @@ def test_no_scheduler(tmp_path: Path, capsys):
     assert main(['evaluate', *words]) == 2
     assert main(['evaluate', *words, '--jobs', '2']) == 2
     assert 'leave it out with --cluster' in capsys.readouterr().err
-    assert not list((tmp_path / 'r').iterdir())
+    assert not (tmp_path / 'r').exists()
 
 
 def test_a_scheduler_file_leads_to_the_scheduler(cluster, tmp_path: Path):
