@@ -108,6 +108,41 @@ def test_depth_that_never_fits_is_waited_for_no_more(
     assert words in made.fit.fault
 
 
+@pytest.mark.parametrize('every', [2, 4])
+@pytest.mark.parametrize('late_ms', [12, 45])
+def test_where_depth_comes_with_every_few_images_the_others_do_not_wait(
+    every: int, late_ms: int
+) -> None:
+    """Nor is any depth lost; and where it comes at the full rate again, two images' at most."""
+    made = intake()
+    events = []
+    for index in range(120):
+        events.append((index * 33, 'color', index))
+        if index % every == 0 or index >= 90:
+            events.append((index * 33 + late_ms, 'depth', index))
+    events += [(at, 'poll', 0) for at in range(0, 4200, 25)]
+    waited, paired = {}, set()
+    for at, what, index in sorted(events):
+        stamp = BASE + index * 33 * MS
+        if what == 'poll':
+            captures = made.poll(at * MS)
+        else:
+            captures = getattr(made, what)(message(stamp), at * MS)
+        for capture in captures:
+            came = capture.color.header.stamp
+            index = (came.sec * 10**9 + came.nanosec - BASE) // (33 * MS)
+            waited[index] = at - index * 33
+            if capture.depth is not None:
+                paired.add(index)
+    assert len(waited) == 120
+    settled = range(10 * every, 120)
+    assert max(waited[index] for index in settled) <= late_ms
+    if late_ms < 33:
+        assert {waited[index] for index in settled if index not in paired} == {0}
+    assert {index for index in settled if index % every == 0 and index < 90} <= paired
+    assert len(set(range(90, 120)) - paired) <= 2
+
+
 def test_depth_that_was_passed_over_in_time_is_waited_for_again() -> None:
     made = intake()
     for index in range(5):

@@ -26,6 +26,8 @@ MISSES = 3
 PATIENT_WAIT_NS = 1_000_000_000
 """Least wait for depth where every pair counts and speed does not."""
 HELD = 5
+GAPS = 8
+"""Steps between depth stamps of which the shortest is the period: one that is lost is none."""
 REMEMBERED = 60
 """Colour images that went out alone and are remembered: two seconds at 30 Hz."""
 
@@ -43,6 +45,7 @@ class DepthFit:
         self._misses = 0
         self._alone: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
         self._newest: int | None = None
+        self._gaps: deque[int] = deque(maxlen=GAPS)
         self._apart_ns = 0
         self._late_ns: int | None = None
 
@@ -78,11 +81,20 @@ class DepthFit:
 
     def came(self, stamp_ns: int, arrival_ns: int) -> None:
         """A depth image came; where its colour image went out alone, it may have been in time."""
+        if self._newest is not None:
+            self._gaps.append(max(stamp_ns - self._newest, 0))
         self._newest = stamp_ns
         late = [a for s, a in self._alone if abs(s - stamp_ns) <= self._tolerance_ns]
         self._late_ns = arrival_ns - late[-1] if late else None
         if self._late_ns is not None and self._late_ns <= self._wait_ns:
             self._misses = 0
+
+    def leaves_out(self, stamp_ns: int) -> bool:
+        """Whether a colour image falls between two depth images, at the rate at which they come."""
+        if self._newest is None or len(self._gaps) < GAPS:
+            return False
+        period = min(self._gaps)
+        return self._newest - period < stamp_ns < self._newest + period - self._tolerance_ns
 
 
 class Intake:
@@ -147,7 +159,7 @@ class Intake:
             return []
         self._arrivals[stamp] = arrival_ns
         captures = self._captures(self._pairer.add_color(stamp, message), arrival_ns)
-        return captures + self.poll(arrival_ns)
+        return captures + self._left_out(arrival_ns) + self.poll(arrival_ns)
 
     def depth(self, message: Any, arrival_ns: int) -> list[Capture]:
         """Take in a depth message; returns the pairs that are now complete."""
@@ -158,7 +170,8 @@ class Intake:
             self._statistics.count('duplicates')
             return []
         self.fit.came(stamp, arrival_ns)
-        return self._captures(self._pairer.add_depth(stamp, message), arrival_ns)
+        captures = self._captures(self._pairer.add_depth(stamp, message), arrival_ns)
+        return captures + self._left_out(arrival_ns)
 
     def poll(self, now_ns: int) -> list[Capture]:
         """What has waited long enough; to be called every few hundredths of a second."""
@@ -178,14 +191,22 @@ class Intake:
             return self._wait_ns if self._patient else 0
         return self._first_wait_ns
 
-    def _captures(self, pairs: list[Pair[Any, Any]], now_ns: int) -> list[Capture]:
+    def _left_out(self, now_ns: int) -> list[Capture]:
+        """Colour images that need not wait: depth comes at a lower rate, and has none for them."""
+        left = [] if self._patient else [s for s in self._arrivals if self.fit.leaves_out(s)]
+        return self._captures(self._pairer.release(max(left)), now_ns, True) if left else []
+
+    def _captures(
+        self, pairs: list[Pair[Any, Any]], now_ns: int, left_out: bool = False
+    ) -> list[Capture]:
         captures = []
         for pair in pairs:
             arrival = self._arrivals.pop(pair.stamp_ns, now_ns)
             if pair.depth is not None:
                 self.fit.paired()
             else:
-                self.fit.missed(pair.stamp_ns, arrival)
+                if not left_out:
+                    self.fit.missed(pair.stamp_ns, arrival)
                 self._statistics.count('color_without_depth')
             captures.append(Capture(pair.color, pair.depth, self._camera, now_ns))
         self._forget_lost()
