@@ -83,6 +83,25 @@ def test_no_output_goes_into_a_bag_folder(
 
 
 @pytest.mark.parametrize('overwrite', [[], ['--overwrite']])
+def test_no_output_goes_into_the_folder_of_a_bag_whose_file_is_the_source(
+    overwrite: list[str], bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (storage,) = bag.glob('*.mcap')
+    (tmp_path / 'way.mcap').symlink_to(storage)
+    os.link(bag / 'metadata.yaml', tmp_path / 'other.yaml')
+    before = digest(bag)
+    for source in (storage, tmp_path / 'way.mcap'):
+        for option, place in (
+            ('--output', bag / 'metadata.yaml'), ('--output', tmp_path / 'other.yaml'),
+            ('--bag', bag / 'y.mcap'),
+        ):  # fmt: skip
+            assert 'source' in refused(capsys, 'track', source, *INIT, option, place, *overwrite)
+        assert 'source' in refused(capsys, 'convert', source, bag / 'y.mcap', *overwrite)
+    assert digest(bag) == before
+    assert main(['track', str(storage), *INIT, '--output', str(tmp_path / 'a.csv')]) == 0
+
+
+@pytest.mark.parametrize('overwrite', [[], ['--overwrite']])
 def test_no_output_goes_into_a_sequence_folder(
     overwrite: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,6 +13,7 @@ no case give one file many names.
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import logging
 import os
@@ -49,7 +50,8 @@ def check_outputs(
 
     Args:
         outputs: paths by the names of their options, which the messages say.
-        sources: what is read: files, or folders with all that lies in them.
+        sources: what is read: files, or folders with all that lies in them. A file of a rosbag2
+            folder stands for the folder.
         overwrite: whether files that are there may be replaced; sources never are.
         folders: the options whose paths are folders.
 
@@ -57,20 +59,23 @@ def check_outputs(
         RecordingError: for an output that is a source or lies in one, is there already, is no
             regular file, lies in a folder that does not exist, or is another output, too.
     """
-    seen: dict[tuple[Identity, str], str] = {}
+    places: dict[str, tuple[Path, Path, os.stat_result | None]] = {}
     for option, given in outputs.items():
-        path = Path(given)
-        target = _target(path)
-        _check_place(path, target)
-        there = _stat(target)
+        target = _target(Path(given))
+        _check_place(Path(given), target)
+        places[option] = Path(given), target, _stat(target)
+    parts = list(dict.fromkeys(part for source in sources for part in _parts(source)))
+    read = _read_among([there for *_, there in places.values() if there is not None], parts)
+    around = _finder(parts)
+    seen: dict[tuple[Identity, str], str] = {}
+    for option, (path, target, there) in places.items():
         name = f'{option} {path}'
-        for source in sources:
-            if there is not None and _identity(there) in _identities(source, there):
-                raise RecordingError(f'{name} is the source itself: give another name')
-            if _lies_in(target, source):
-                raise RecordingError(
-                    f'{name} lies inside the source {source}: give a name outside of it'
-                )
+        if there is not None and _identity(there) in read:
+            raise RecordingError(f'{name} is the source itself: give another name')
+        if source := around(target.parent):
+            raise RecordingError(
+                f'{name} lies inside the source {source}: give a name outside of it'
+            )
         if there is None:
             folder = _stat(target.parent)
             assert folder is not None  # _check_place has seen it
@@ -404,24 +409,47 @@ def _identity(there: os.stat_result) -> Identity:
     return there.st_dev, there.st_ino
 
 
-def _lies_in(target: Path, source: str | os.PathLike[str]) -> bool:
-    """Whether ``target`` lies in the folder ``source``, at any depth."""
-    try:
-        folder = os.stat(source)
-        if not stat.S_ISDIR(folder.st_mode):
-            return False
-        return any(os.path.samestat(os.stat(parent), folder) for parent in target.parents)
-    except OSError:
-        return False  # the source is not there: opening it says so
-
-
-def _identities(source: str | os.PathLike[str], output: os.stat_result) -> Iterator[Identity]:
-    """Of a source, and of all files in it where ``output`` could be one of them."""
+def _parts(source: str | os.PathLike[str]) -> Iterator[str]:
+    """A source, and the rosbag2 folder that it is a file of: another file there alters the bag."""
     path = os.fspath(source)
+    yield path
+    if os.path.isfile(path):
+        for name in (path, os.path.realpath(path)):
+            folder = os.path.dirname(name) or os.curdir
+            if os.path.exists(os.path.join(folder, 'metadata.yaml')):
+                yield folder
+
+
+def _finder(sources: Sequence[str]) -> Callable[[Path], str | None]:
+    """Tells of a folder which of the sources it is, or lies in at any depth."""
+    roots: dict[Identity, str] = {}
+    for source in sources:
+        with contextlib.suppress(OSError):  # it is not there: opening it says so
+            roots[_identity(os.stat(source))] = source
+
+    @functools.cache
+    def find(folder: Path) -> str | None:
+        with contextlib.suppress(OSError):
+            if (found := roots.get(_identity(os.stat(folder)))) is not None:
+                return found
+        return None if folder.parent == folder else find(folder.parent)
+
+    return find
+
+
+def _read_among(outputs: Sequence[os.stat_result], sources: Sequence[str]) -> set[Identity]:
+    """Those of the outputs that are sources, or files in them."""
+    among = {_identity(there) for there in outputs}
+    files = any(not stat.S_ISDIR(there.st_mode) for there in outputs)
+    return {i for source in sources for i in _identities(source, files) if i in among}
+
+
+def _identities(path: str, files: bool) -> Iterator[Identity]:
+    """Of a source, and of all files in it where they are asked for."""
     for name in (path, *(path + end for end in _BESIDE)):
         with contextlib.suppress(OSError):
             yield _identity(os.stat(name))
-    if stat.S_ISDIR(output.st_mode):
+    if not files:
         return
     seen: set[Identity] = set()
     for folder, subfolders, names in os.walk(path, followlinks=True):
