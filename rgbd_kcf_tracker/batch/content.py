@@ -41,7 +41,8 @@ def files_digest(paths: Sequence[Path]) -> str:
         if result is None:
             digest = hashlib.sha256()
             for name, path, _ in files:
-                digest.update(f'{name}\0{_file_digest(path) if path else MISSING}\0'.encode())
+                held = _file_digest(path) if path else MISSING
+                digest.update(_bytes(f'{name}\0{held}\0'))
             result = digest.hexdigest()[:32]
             cache.write(result)
         return result
@@ -70,6 +71,11 @@ def _entry(name: str, path: Path) -> _Entry:
     return name, path if state is not None and stat.S_ISREG(state.st_mode) else None, state
 
 
+def _bytes(names: str) -> bytes:
+    """Names of files need not be UTF-8."""
+    return names.encode(errors='surrogateescape')
+
+
 def _file_digest(path: Path) -> str:
     digest = hashlib.sha256()
     with path.open('rb', buffering=0) as file:
@@ -90,7 +96,7 @@ class _Cache:
         self._state = hashlib.sha256(json.dumps(state).encode()).hexdigest()
         self._newest = max((s.st_ctime_ns for _, _, s in files if s is not None), default=0)
         folder = os.environ.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
-        name = hashlib.sha256('\0'.join(places).encode()).hexdigest()[:32]
+        name = hashlib.sha256(_bytes('\0'.join(places))).hexdigest()[:32]
         self._path = Path(folder, 'rgbd_kcf_tracker', 'digests', name[:2], f'{name}.json')
 
     def read(self) -> str | None:

@@ -28,7 +28,8 @@ def write_rows(path: Path, header: Sequence[str], rows: Iterable[Sequence[object
     """
     with (
         moved_into_place(path) as temporary,
-        temporary.open('w', encoding='utf-8', newline='') as file,
+        # Names of files need not be UTF-8.
+        temporary.open('w', encoding='utf-8', errors='backslashreplace', newline='') as file,
     ):
         writer = csv.writer(file, lineterminator='\n')
         writer.writerow(header)
