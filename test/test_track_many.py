@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -189,6 +190,109 @@ def test_names_tell_recordings_apart():
         names(['/d/a b', '/d/a_b'])
 
 
+def contents(*folders: Path) -> dict[Path, bytes]:
+    return {p: p.read_bytes() for f in folders for p in f.rglob('*') if p.is_file()}
+
+
+@pytest.fixture
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Sources of which no output needs to be made: they are refused before anything is read."""
+    for name in (
+        'd/a.mcap',
+        'd/b.mcap',
+        'd/seq/rgb/000000.png',
+        'bag/metadata.yaml',
+        'bag/x_0.mcap',
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(f'years of work: {name}')
+    (tmp_path / 'o').mkdir()
+    (tmp_path / 'o' / 'tracks.csv').write_text(f'{tmp_path}/d/a.mcap')
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize('overwrite', [[], ['--overwrite']])
+@pytest.mark.parametrize(
+    'words',
+    [
+        ['d/a.mcap', 'd/b.mcap', '--output', 'new', '--bag', 'd'],
+        ['d/a.mcap', '--output', 'new', '--bag', 'd'],
+        ['d/a.mcap', '--output', 'new', '--bag', 'links'],
+        ['d/a.mcap', '--output', 'links'],
+        ['d/seq', 'd/a.mcap', '--output', 'd/seq'],
+        ['d/seq', 'd/a.mcap', '--output', 'new', '--mot', 'd/seq/new'],
+        ['bag/x_0.mcap', '--output', 'bag'],
+        ['--list', 'o/tracks.csv', '--output', 'o'],
+    ],
+)
+def test_no_source_is_written_to(places: Path, words: list[str], overwrite: list[str], capsys):
+    (places / 'links').mkdir()
+    (places / 'links' / 'a.mcap').symlink_to(places / 'd' / 'a.mcap')
+    (places / 'links' / 'runs.jsonl').hardlink_to(places / 'd' / 'a.mcap')
+    before = contents(places)
+    assert main(['track', *words, *WORDS, *overwrite]) == 2
+    error = capsys.readouterr().err
+    assert 'is the source itself' in error or 'lies inside the source' in error
+    assert contents(places) == before
+
+
+def test_tables_of_something_else_are_not_replaced_unasked(
+    recordings: Path, tmp_path: Path, capsys
+):
+    words = ['track', str(recordings / 'walk.mcap'), *WORDS, '--output', str(tmp_path)]
+    for name in ('tracks.csv', 'sources.csv'):
+        (tmp_path / name).write_text('years of work')
+    before = contents(tmp_path)
+    for part in ([], ['--shard', '1/1']):
+        assert main([*words, *part]) == 2
+        assert 'sources.csv and 1 more would be replaced' in capsys.readouterr().err
+    assert contents(tmp_path) == before
+    assert main([*words, '--overwrite']) == 0
+    assert main(words) == 0, 'its own are gone on with'
+    assert len(rows_of(tmp_path / 'tracks.csv')) == 5
+
+
+def test_a_run_that_a_full_disk_ended_is_gone_on_with(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+):
+    """The file of a recording has its name, and the note that it is done did not fit."""
+    places = ['--mot', str(tmp_path / 'mot'), '--output', str(tmp_path / 'o')]
+    words = ['track', str(recordings / 'normal_0'), *WORDS, *places]
+
+    def full(*_: object) -> None:
+        raise RecordingError('No space left on device')
+
+    with monkeypatch.context() as patch:
+        patch.setattr(track_many, '_keep', full)
+        assert main(words) == 2
+    made = contents(tmp_path / 'o' / 'tracks', tmp_path / 'mot')
+    assert len(made) == 2
+    assert main([*words, '--param', 'padding=2.0']) == 2
+    assert 'would be replaced' in capsys.readouterr().err
+    assert main(words) == 0
+    assert contents(tmp_path / 'o' / 'tracks', tmp_path / 'mot') == made
+
+
+def test_a_list_that_is_a_pipe_is_not_waited_for(tmp_path: Path, capsys):
+    os.mkfifo(tmp_path / 'pipe')
+    words = ['track', '--list', str(tmp_path / 'pipe'), '--output', str(tmp_path / 'o')]
+    assert main(words) == 2
+    assert 'pipe is a named pipe' in capsys.readouterr().err
+
+
+def test_names_that_are_no_utf8(recordings: Path, tmp_path: Path):
+    sources = [tmp_path / os.fsdecode(name) for name in (b'a\xff.mcap', b'b\xff.mcap')]
+    for source in sources:
+        shutil.copy(recordings / 'walk.mcap', source)
+    words = ['track', *map(str, sources), *WORDS, '--output', str(tmp_path / 'o')]
+    assert main(words) == 0
+    rows = rows_of(tmp_path / 'o' / 'sources.csv')
+    assert [row['source'] for row in rows] == [f'{tmp_path}/{n}\\udcff.mcap' for n in 'ab']
+    shutil.copy(recordings / 'normal_0' / 'groundtruth.txt', sources[0])
+    assert main([*words, '--overwrite']) == track_many.EXIT_FAILURES, 'another content is seen'
+
+
 @pytest.mark.parametrize(
     ('words', 'message'),
     [
@@ -196,7 +300,7 @@ def test_names_tell_recordings_apart():
         (['normal_0', 'nothing', '--output', 'o'], 'nothing does not exist'),
         (['none_*', '--output', 'o'], 'none_* matches nothing'),
         (['--output', 'o'], 'no recordings'),
-        (['--list', 'none.txt', '--output', 'o'], 'none.txt cannot be read'),
+        (['--list', 'none.txt', '--output', 'o'], 'none.txt does not exist'),
         (['normal_*', '--output', 'o', '--variant', 'deep'], "unknown variant 'deep'"),
         (['normal_*', '--output', 'o', '--param', 'padding=x'], 'padding'),
         (['normal_*', '--output', 'o', '--init', '1,2'], 'is no box'),

@@ -19,6 +19,7 @@ from typing import Any
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
     NOTICE,
+    RECORD,
     WORKER_OPTIONS,
     Progress,
     add_worker_options,
@@ -103,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     """Follow targets through all recordings that are not done yet; returns the exit code."""
     require('batch', 'track of several recordings')
     from rgbd_kcf_tracker.batch.loop import run_all
-    from rgbd_kcf_tracker.recordings.outputs import make_folder
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
 
     sources = _sources(args)
     folders = _folders(args)
@@ -116,13 +117,19 @@ def run(args: argparse.Namespace) -> int:
     if args.table == 'parquet':
         require('parquet', '--table parquet')
     _check_parameters(args)
+    read = [*sources, *([args.list] if args.list and args.list != '-' else [])]
+    for kind, folder in folders.items():  # each alone: they may be one
+        check_outputs({f'--{kind}': folder}, read, overwrite=True, folders=(f'--{kind}',))
     for folder in folders.values():
         make_folder(folder)
+    tables = [folders['output'] / name for name in (SOURCES, f'tracks.{args.table or TABLES[0]}')]
+    _refuse_to_write(own, [*tables, folders['output'] / RECORD], read)
     needs = list(dict.fromkeys(Path(job.source).parent for job in own))
     with open_workers(args, needs, list(folders.values())) as workers:
         own = _identified(own, None if args.cluster is None else workers)
         todo = [job for job in own if not _is_done(folders['output'], job)]
-        _refuse_to_replace(todo, args)
+        if not args.overwrite:
+            _refuse_to_replace(todo, tables)
         rows: dict[str, dict[str, Any]] = {}
         with Progress(len(own), 'recording') as progress, interrupts.held(NOTICE):
             progress.report(len(own) - len(todo), '', found=True)
@@ -184,12 +191,12 @@ def _sources(args: argparse.Namespace) -> list[str]:
 
 
 def _listed(place: str) -> list[str]:
+    from rgbd_kcf_tracker.recordings.files import read_text
+
     try:
-        text = sys.stdin.read() if place == '-' else Path(place).read_text(encoding='utf-8')
-    except OSError as error:
-        raise RecordingError(f'{place} cannot be read: {error.strerror or error}') from None
+        text = sys.stdin.read() if place == '-' else read_text(Path(place))
     except UnicodeDecodeError:
-        raise RecordingError(f'{place} is not a text file') from None
+        raise RecordingError('standard input is not text') from None
     lines = (line.strip() for line in text.splitlines())
     return [line for line in lines if line and not line.startswith('#')]
 
@@ -284,13 +291,50 @@ def _kept(folder: Path, job: TrackJob) -> dict[str, Any]:
         return {}
 
 
-def _refuse_to_replace(jobs: Sequence[TrackJob], args: argparse.Namespace) -> None:
-    there = [path for job in jobs for path in _files(job) if path.exists()]
-    if there and not getattr(args, 'overwrite', False):
+def _note_begun(job: TrackJob) -> None:
+    """Before a file has its name: where what follows fails, the next run knows it for its own."""
+    from rgbd_kcf_tracker.recordings.outputs import write_atomically
+
+    note = {'begun': job.key, 'files': [str(path) for path in _files(job)]}
+    folder = Path(job.options['output']).parents[1]
+    write_atomically(_done_path(folder, job), json.dumps(note) + '\n')
+
+
+def _was_begun(folder: Path, job: TrackJob, path: Path) -> bool:
+    kept = _kept(folder, job)
+    return kept.get('begun') == job.key and str(path) in kept.get('files', ())
+
+
+def _refuse_to_write(jobs: Sequence[TrackJob], others: Sequence[Path], read: list[str]) -> None:
+    """Refuse what is read, or lies in it, whatever may be replaced."""
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+
+    named = {f'--output, its {path.name}:': path for path in others}
+    for job in jobs:
+        for kind in KINDS:
+            if job.options[kind]:
+                named[f'--{kind} for {job.name}:'] = Path(job.options[kind])
+    # A folder that is not there yet lies in one that was looked at.
+    there = {name: path for name, path in named.items() if path.parent.exists()}
+    check_outputs(there, read, overwrite=True)
+
+
+def _refuse_to_replace(jobs: Sequence[TrackJob], tables: Sequence[Path]) -> None:
+    """Refuse to replace what no earlier run of the same command wrote."""
+    folder = tables[0].parent
+    there = [
+        path
+        for job in jobs
+        for path in _files(job)
+        if path.exists() and not _was_begun(folder, job, path)
+    ]
+    if not (folder / RECORD).exists():
+        there += [path for path in tables if path.exists()]
+    if there:
         more = f' and {len(there) - 1} more' if len(there) > 1 else ''
         raise RecordingError(
-            f'{there[0]}{more} would be replaced, made with other options, another version or from '
-            'another recording: give another folder, or add --overwrite'
+            f'{there[0]}{more} would be replaced, made with other options, another version, from '
+            'another recording or by something else: give another folder, or add --overwrite'
         )
 
 
@@ -306,6 +350,7 @@ def _follow(job: TrackJob) -> dict[str, Any]:
     options = job.options | {kind: str(path) for kind, path in parts.items()}
     try:
         outcome = track.follow(argparse.Namespace(**options), watched=False)
+        _note_begun(job)
         for kind, path in wanted.items():
             parts[kind].replace(path)
     finally:
