@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import time
 from dataclasses import replace
@@ -249,6 +250,39 @@ def test_mistakes_are_named(
     status, output = rig.run_replay(tmp_path, **(given or {'rate': 1.0}))
     assert status == 2
     assert words in output
+
+
+def test_a_report_never_replaces_the_recording_and_nothing_else_unasked(
+    bag: Path, tmp_path: Path
+) -> None:
+    source = shutil.copy(bag, tmp_path / 'walk.mcap')
+    (tmp_path / 'seq' / 'rgb').mkdir(parents=True)
+    (tmp_path / 'seq' / 'groundtruth.txt').write_text('years of work')
+    (tmp_path / 'way.json').symlink_to(source)
+    (tmp_path / 'old.json').write_text('years of work')
+    for recording, name, overwrite, words in (
+        (source, 'walk.mcap', True, 'is the source itself'),
+        (source, 'way.json', True, 'is the source itself'),
+        (tmp_path / 'seq', 'seq/groundtruth.txt', True, 'is the source itself'),
+        (tmp_path / 'seq', 'seq/new.json', False, 'lies inside the source'),
+        (source, 'old.json', False, 'set overwrite to replace it'),
+        (source, 'none/new.json', False, 'make it first'),
+    ):
+        report = tmp_path / name
+        status, output = rig.run_replay(
+            tmp_path, bag=str(recording), report=str(report), overwrite=overwrite, rate=0.0
+        )
+        assert status == 2, output
+        assert words in output
+    assert source.read_bytes() == bag.read_bytes()
+    for path in (tmp_path / 'seq' / 'groundtruth.txt', tmp_path / 'old.json'):
+        assert path.read_text() == 'years of work'
+    status, output = rig.run_replay(
+        tmp_path, bag=str(source), report=str(tmp_path / 'old.json'), overwrite=True, rate=0.0,
+        wait_for_subscribers=0.0,
+    )  # fmt: skip
+    assert status == 0, output
+    assert json.loads((tmp_path / 'old.json').read_text())['color_images'] == len(rig.frames())
 
 
 def test_bad_bags(bag: Path, tmp_path: Path) -> None:

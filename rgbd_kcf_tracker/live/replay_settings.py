@@ -90,6 +90,7 @@ class ReplayParameters(Parameters):
     report: str = parameter(
         '', 'A JSON file for the figures of the run: images sent, answers, rate, latency.'
     )
+    overwrite: bool = parameter(False, 'Replace the report if it is there; the recording never is.')
 
     def topic_list(self) -> tuple[str, ...]:
         """The names in ``topics``."""

@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.live.replay_source import ReplaySource
 from rgbd_kcf_tracker.live.stopping import Stopping
 from rgbd_kcf_tracker.parameters import describe
+from rgbd_kcf_tracker.recordings.outputs import check_outputs, write_file
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
@@ -63,12 +64,16 @@ class ReplayNode(Node):
         """Replay as the parameters say; returns at the end or soon after ``stop`` is set.
 
         Raises:
-            RecordingError: where the recording cannot be opened or read, or holds no messages.
-            ParameterError: where nobody listens in lock-step, or a topic is not in the recording.
+            RecordingError: where the recording cannot be opened or read, or holds no messages, or
+                the report cannot be written.
+            ParameterError: where nobody listens in lock-step, a topic is not in the recording, or
+                the report is there already.
         """
         parameters = self.parameters
         if not parameters.bag:
             raise ParameterError('no recording given: set the parameter bag, as in -p bag:=FILE')
+        if parameters.report:
+            check_report(parameters.report, parameters.bag, parameters.overwrite)
         try:
             source = ReplaySource(Path(parameters.bag), parameters)
         except RecordingError as error:
@@ -197,7 +202,8 @@ class ReplayNode(Node):
         if hint:
             self.get_logger().warning(f'no answers on {parameters.answer_topic}: {hint}')
         if parameters.report:
-            write_report(Path(parameters.report), figures)
+            text = json.dumps(figures, indent=2) + '\n'
+            write_file(parameters.report, text.encode(), parameters.overwrite)
 
     def _send(self, message: Message) -> None:
         publisher = self._publishers_by_topic.get(message.topic)
@@ -267,15 +273,16 @@ def summary(figures: dict[str, Any]) -> str:
     )
 
 
-def write_report(path: Path, figures: dict[str, Any]) -> None:
-    """Write the figures as JSON, whole or not at all.
+def check_report(report: str, bag: str, overwrite: bool) -> None:
+    """Refuse, before anything is replayed, a report that must not or cannot be written.
 
     Raises:
-        RecordingError: where the file cannot be written.
+        RecordingError: where it cannot be, is the recording or lies in it.
+        ParameterError: where it is there already.
     """
-    part = path.with_name(path.name + '.part')
-    try:
-        part.write_text(json.dumps(figures, indent=2) + '\n', encoding='utf-8')
-        os.replace(part, path)
-    except OSError as error:
-        raise RecordingError(f'{path} cannot be written: {error.strerror or error}') from None
+    check_outputs({'report': report}, [bag], overwrite=True)
+    if os.path.exists(report) and not overwrite:
+        raise ParameterError(
+            f'report {report} is there already: give another name, or set overwrite to replace it, '
+            'as in -p overwrite:=true'
+        )
