@@ -155,6 +155,7 @@ def test_the_command(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):
     page = (report / 'index.html').read_text()
     assert 'id="identity"' in page
     assert 'Percent of pairs that are one person' in page
+    assert evaluate(two_cameras, '--identity', '--fps', 1, '--report', report) == 0, 'our own'
 
 
 def test_a_recording_that_fails_is_listed(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):

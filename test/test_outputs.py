@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from bag_rig import camera_messages, make_frames, write_mcap, write_rosbag2
 
+from rgbd_kcf_tracker.bench import moving_picture
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.frame import Frame
@@ -217,6 +218,36 @@ def test_one_rule_for_every_command(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert not list(tmp_path.glob('*.part*'))
     # A report that was begun is gone on with, without being asked.
     assert main([*map(str, commands['report']), str(tmp_path / 'report')]) == 0
+
+
+def test_a_page_that_is_no_report_of_ours_is_not_replaced_unasked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Not even where a folder beside it is named as one of ours."""
+    words = ['evaluate', write_folder(tmp_path / 'seq'), '--variants', 'kcf', '--jobs', '1']
+    words += ['--report', tmp_path / 'mine']
+    (tmp_path / 'mine' / 'results').mkdir(parents=True)
+    (tmp_path / 'mine' / 'index.html').write_text('years of work')
+    assert 'is no report' in refused(capsys, *words)
+    assert (tmp_path / 'mine' / 'index.html').read_text() == 'years of work'
+    assert main([*map(str, words), '--overwrite']) == 0
+    assert main([*map(str, words)]) == 0, 'our own is gone on with'
+
+
+def test_the_moving_picture_replaces_nothing_unasked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip('imageio_ffmpeg', reason="needs the extra 'video'")
+    monkeypatch.setattr(moving_picture, 'pictures', lambda *_: [np.zeros((8, 16, 3), np.uint8)])
+    picture = tmp_path / 'a.gif'
+    picture.write_text('years of work')
+    with pytest.raises(SystemExit) as ended:
+        moving_picture.main([str(picture)])
+    assert ended.value.code == 2
+    assert '--overwrite' in capsys.readouterr().err
+    assert picture.read_text() == 'years of work'
+    assert moving_picture.main([str(picture), '--overwrite']) == 0
+    assert picture.read_bytes().startswith(b'GIF8')
 
 
 def test_a_report_on_a_full_disk_is_gone_on_with(

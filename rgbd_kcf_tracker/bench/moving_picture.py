@@ -3,7 +3,7 @@
 
 """The short moving picture of the README: an occlusion and the return, simulated.
 
-python -m rgbd_kcf_tracker.bench.moving_picture docs/occlusion.gif
+python -m rgbd_kcf_tracker.bench.moving_picture docs/occlusion.gif --overwrite
 """
 
 from __future__ import annotations
@@ -18,8 +18,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.cli.common import add_overwrite_option
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings import draw_track
+from rgbd_kcf_tracker.recordings.outputs import check_outputs, write_file
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker
 from rgbd_kcf_tracker.view.showing import depth_picture
 from rgbd_kcf_tracker.view.sources import SimulatedRecording, first_box
@@ -68,7 +71,12 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('dest', type=Path, help='the .gif file')
     parser.add_argument('--first', type=int, default=14, help='frame to begin with')
     parser.add_argument('--last', type=int, default=84, help='frame to stop before')
+    add_overwrite_option(parser, 'the file if it is there')
     options = parser.parse_args(args)
+    try:
+        check_outputs({'dest': options.dest}, overwrite=options.overwrite)
+    except RecordingError as error:
+        parser.error(str(error))
     frames = list(pictures(options.first, options.last))
     height, width = frames[0].shape[:2]
     palette = (
@@ -76,14 +84,18 @@ def main(args: list[str] | None = None) -> int:
         '[b][p]paletteuse=dither=none:diff_mode=rectangle'
     )
     command = [
-        imageio_ffmpeg.get_ffmpeg_exe(), '-y', '-loglevel', 'error', '-f', 'rawvideo',
+        imageio_ffmpeg.get_ffmpeg_exe(), '-loglevel', 'error', '-f', 'rawvideo',
         '-pix_fmt', 'bgr24', '-s', f'{width}x{height}', '-r', str(RATE_HZ / EVERY), '-i', '-',
-        '-filter_complex', palette, '-loop', '0', str(options.dest),
+        '-filter_complex', palette, '-loop', '0', '-f', 'gif', '-',
     ]  # fmt: skip
-    result = subprocess.run(command, input=b''.join(f.tobytes() for f in frames), check=False)
+    raw = b''.join(frame.tobytes() for frame in frames)
+    result = subprocess.run(command, input=raw, stdout=subprocess.PIPE, check=False)
     if result.returncode == 0:
-        size = options.dest.stat().st_size
-        print(f'{options.dest}: {len(frames)} pictures, {size / 1000:.0f} kB')
+        try:
+            write_file(options.dest, result.stdout, options.overwrite)
+        except RecordingError as error:
+            parser.error(str(error))
+        print(f'{options.dest}: {len(frames)} pictures, {len(result.stdout) / 1000:.0f} kB')
     return result.returncode
 
 

@@ -218,7 +218,7 @@ def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None
         RecordingError: where it does.
     """
     from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
-    from rgbd_kcf_tracker.evaluation.report import REPORT_NAMES
+    from rgbd_kcf_tracker.evaluation.report import BEGUN_NAMES
     from rgbd_kcf_tracker.recordings.outputs import check_outputs
 
     sources = [text for text in datasets if not text.startswith(PREFIX)]
@@ -227,7 +227,7 @@ def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None
         held = set(os.listdir(folder)) if folder.exists() else set()
     except OSError as error:
         raise RecordingError(f'{folder} cannot be read: {error.strerror or error}') from None
-    if 'results' not in held and held - REPORT_NAMES and not overwrite:
+    if RECORD not in held and held - BEGUN_NAMES and not overwrite:
         raise RecordingError(
             f'{folder} is there already, and is no report: give another name, or add '
             '--overwrite to write into it'

@@ -221,6 +221,7 @@ def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
             seen.append(identity.look(sequence.name, frames, identity.metric_views()))
         except RgbdKcfError as error:
             failures.append(Failure(sequence.name, '', str(error)))
+    record(args.report, 'one process', failures=len(failures))
     pairs = identity.all_pairs(seen, identity.metric_views())
     table = write_identity_report(args.report, pairs, failures, _heading(args))
     print(table.text())

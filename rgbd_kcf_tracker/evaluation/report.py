@@ -36,12 +36,8 @@ from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 PAGE = 'index.html'
 PER_FRAME = 'per_frame.csv'
-REPORT_NAMES = frozenset(
-    {PAGE, PER_FRAME, 'pairs.csv', 'failures.txt', 'report.json', 'tables.md'}
-    | {'runs.jsonl', 'times', 'times.csv', 'parts', 'settings.csv'}
-    | {'results', 'submission', 'tables', 'thumbs', 'truth'}
-)
-"""What a report folder holds, whole or begun."""
+BEGUN_NAMES = frozenset({'parts', 'results', 'thumbs', 'times', 'truth'})
+"""What a report folder may hold before its runs are recorded in it."""
 
 
 @dataclass(frozen=True, slots=True)
