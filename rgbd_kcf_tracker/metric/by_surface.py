@@ -420,10 +420,9 @@ class BySurface:
 
     def _at(self, view: DepthView, box: Box) -> tuple[FloatArray, FloatArray]:
         """Where the target would be in a box of the image, and how surely, ``(3,)`` metres each."""
-        k, z = view.intrinsics, float(self.motion.position[2])
-        x = (box.cx / view.step - k.cx) * z / k.fx
-        y = (box.y / view.step - k.cy) * z / k.fy
-        return np.array([x, y, z]), np.array([0.1, 0.1, 10.0])
+        z = float(self.motion.position[2])
+        place = view.intrinsics.deproject(box.cx / view.step, box.y / view.step, z)
+        return np.array(place), np.array([0.1, 0.1, 10.0])
 
     @staticmethod
     def outline(scene: Scene, seen: Silhouette) -> Box:

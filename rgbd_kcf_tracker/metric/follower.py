@@ -398,13 +398,8 @@ class Follower:
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
-            if (
-                unlike
-                or self._stood_elsewhere(account, look)
-                or any(
-                    refused(account, look.box) for refused in (self._stands, self._taken, self._far)
-                )
-            ):
+            reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
+            if unlike or any(refused(account, look) for refused in reasons):
                 self._look.refuse(frame, look)
                 look = None
         if look is not None:
@@ -443,21 +438,22 @@ class Follower:
         place = _place(account.scene.view, look.box, look.depth)
         return self._stood.log_odds(place, LOOK_SIGMA) < ELSEWHERE
 
-    def _stands(self, account: Account, box: Box) -> bool:
+    def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
-        return self._mobile and _room_share(account, box) > STANDING
+        return self._mobile and _room_share(account, look.box) > STANDING
 
-    def _taken(self, account: Account, box: Box) -> bool:
+    def _taken(self, account: Account, look: Look) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""
-        pixels = account.parts.kinds[_part(account.scene, box)]
+        pixels = account.parts.kinds[_part(account.scene, look.box)]
         index = account.sight_among(account.parts.counted(pixels.ravel()))
         if index < 0 or account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
         return owner.first_seen <= self._since and owner.number not in self._about
 
-    def _far(self, account: Account, box: Box) -> bool:
+    def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it."""
+        box = look.box
         if self._carried or not account.settled or box.intersection(self._last_box) > 0:
             return False
         depth = account.scene.view.depth[_part(account.scene, box)]
@@ -595,9 +591,7 @@ def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
 
 def _place(view: DepthView, box: Box, depth: float) -> FloatArray:
     """Where the middle of a box of the image is at a depth, ``(3,)`` metres."""
-    k = view.intrinsics
-    across, down = (box.cx / view.step - k.cx) / k.fx, (box.cy / view.step - k.cy) / k.fy
-    return np.array([across * depth, down * depth, depth])
+    return np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:
