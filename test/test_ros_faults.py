@@ -16,6 +16,7 @@ import threading
 import time
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import cv2
@@ -35,6 +36,7 @@ from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.rig import resident_mb
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.intake import Intake
 from rgbd_kcf_tracker.ros.messages import image_message, stamp_to_ns
 
@@ -515,68 +517,74 @@ def test_boxes_that_nobody_means(live: Live) -> None:
     assert resident_mb(os.getpid()) - before < 100
 
 
+@contextmanager
+def asked_meanwhile(
+    live: Live, first: int, rate: float, ask: Callable[[Box], None]
+) -> Iterator[None]:
+    """Images at 30 Hz are all answered while something is asked of each target's box.
+
+    Args:
+        live: the rig.
+        first: of 45 images.
+        rate: Hz at which is asked, on within the context.
+        ask: called with the box of the newest image.
+    """
+    rig, since = live.rig, len(live.rig.boxes)
+    stop = threading.Event()
+    asked = [scene(first)[2]]
+
+    def go_on() -> None:
+        while not stop.wait(1 / rate):
+            ask(asked[0])
+
+    thread = threading.Thread(target=go_on)
+    thread.start()
+    try:
+        for index in range(first, first + 45):
+            asked[0] = scene(index)[2]
+            rig.send(index)
+            time.sleep(1 / 30)
+        live.answered(since, 45)
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
 @pytest.mark.parametrize('rate', [15, 60])
 def test_requests_do_not_starve_images(live: Live, rate: int) -> None:
     first = live.begin()
-    rig, since = live.rig, len(live.rig.boxes)
-    stop = threading.Event()
-    asked = [scene(first)[2]]
-
-    def ask() -> None:
-        while not stop.wait(1 / rate):
-            rig.send_init(asked[0])
-
-    thread = threading.Thread(target=ask)
-    thread.start()
-    for index in range(first, first + 45):
-        asked[0] = scene(index)[2]
-        rig.send(index)
-        time.sleep(1 / 30)
-    live.answered(since, 45)  # while the requests go on
-    stop.set()
-    thread.join()
+    with asked_meanwhile(live, first, rate, live.rig.send_init):
+        pass
     live.goes_on(first + 45)
 
 
-@pytest.mark.parametrize('ask', ['again', 'anywhere', 'and remove'])
-def test_additions_at_any_rate_do_not_starve_images(live: Live, ask: str) -> None:
+@pytest.mark.parametrize('how', ['again', 'anywhere', 'and remove'])
+def test_additions_at_any_rate_do_not_starve_images(live: Live, how: str) -> None:
     first = live.begin()
-    rig, since = live.rig, len(live.rig.boxes)
-    stop = threading.Event()
-    asked = [scene(first)[2]]
+    rig = live.rig
     add = rig.node.create_publisher(RegionOfInterest, '/tracker/add', 10)
     remove = rig.node.create_publisher(UInt32, '/tracker/remove', 10)
     rig.wait(lambda: add.get_subscription_count() and remove.get_subscription_count())
     time.sleep(0.2)  # discovery is one-sided
+    rng = np.random.default_rng(4)
 
-    def storm() -> None:
-        rng = np.random.default_rng(4)
-        while not stop.wait(1 / 60):
-            x, y, width, height = (round(v) for v in asked[0].as_tuple())
-            if ask != 'again':
-                x, y = int(rng.integers(0, WIDTH - width)), int(rng.integers(0, HEIGHT - height))
-            add.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
-            if ask == 'and remove':
-                for track in live.node._session.others:
-                    remove.publish(UInt32(data=track.id))
+    def ask(box: Box) -> None:
+        x, y, width, height = (round(v) for v in box.as_tuple())
+        if how != 'again':
+            x, y = int(rng.integers(0, WIDTH - width)), int(rng.integers(0, HEIGHT - height))
+        add.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+        if how == 'and remove':
+            for track in live.node._session.others:
+                remove.publish(UInt32(data=track.id))
 
     live.node.set_parameters([Parameter('max_targets', value=3)])
-    thread = threading.Thread(target=storm)
-    thread.start()
-    for index in range(first, first + 45):
-        asked[0] = scene(index)[2]
-        rig.send(index)
-        time.sleep(1 / 30)
-    try:
-        live.answered(since, 45)  # while the requests go on
+    with asked_meanwhile(live, first, 60, ask):
         assert 1 <= len(live.node._session.asked_for) <= 3
-    finally:
-        stop.set()
-        thread.join()
-    if ask == 'again':
+    if how == 'again':
         assert live.node._session.others == ()
         live.says('rejected_requests', 'is followed already, as target')
-    elif ask == 'anywhere':
+    elif how == 'anywhere':
         live.says('rejected_requests', '3 targets are followed')
     live.node.set_parameters([Parameter('max_targets', value=8)])
     live.goes_on(first + 45)
