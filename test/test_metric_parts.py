@@ -415,6 +415,7 @@ def test_a_target_that_comes_fast_is_followed_on_colour_alone():
         found = look.step(frame, 0.1)
         assert found is not None
         look.take(frame, found, 0.1)
+        look.settle()
         assert found.box.iou(Box.from_center(150, 150, size, 1.2 * size)) > 0.6
 
 
@@ -467,6 +468,7 @@ def test_on_colour_alone_what_always_stood_there_is_not_the_target():
         assert (found is not None) == (i < 10)
         if found is not None:
             look.take(at(i, True), found, 0.1)
+            look.settle()
     found = look.step(at(16, True), 0.1)
     assert found is not None
     assert found.box.iou(Box(94, 200, 60, 60)) > 0.7
@@ -495,6 +497,29 @@ def test_nothing_is_learned_of_what_is_refused_and_it_is_not_found_again_until_i
     assert found is not None
     assert found.box.iou(box) > 0.9
     assert found.ratio == pytest.approx(before.ratio, rel=0.05)
+
+
+def test_who_asks_for_colours_gets_what_was_put_off_as_well():
+    wall, box, mask = np.full((300, 300, 3), 90, np.uint8), Box(130, 130, 60, 60), np.ones((60, 60))
+    frames = []
+    for i, grey in enumerate((60, 80)):  # another of the levels that are told apart
+        image = wall.copy()
+        image[130:190, 130:190] = blobs(3, 60) // 2
+        image[150:170, 150:170] = grey
+        frames.append(Frame(image, None, round(1e9 * i)))
+    likely = []
+    for settles in (True, False):
+        look = ByLook(frames[0], box, MetricParameters())
+        asked = np.full((60, 60, 3), 80, np.uint8)
+        before = look.likely(asked, mask > 0)
+        found = look.step(frames[1], 1.0)
+        assert found is not None
+        look.take(frames[1], found, 1.0)
+        if settles:
+            look.settle()
+        likely.append(look.likely(asked, mask > 0))
+        assert likely[-1] > before
+    assert likely[0] == likely[1]
 
 
 def test_windows_reach_outside_the_image_and_shrink_large_ones():

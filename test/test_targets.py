@@ -14,6 +14,8 @@ from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, pic
 from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
 from rgbd_kcf_tracker.insight import insight_in
+from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.identity.appearance import Appearance
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
@@ -43,26 +45,80 @@ def follow(targets: TargetSet, frames: range, scene=both) -> dict[int, list]:
     return tracks
 
 
-def test_what_is_put_off_until_the_answer_is_out_changes_no_answer():
+def without_depth(i: int) -> Frame:
+    return dataclasses.replace(both(i), depth=None)
+
+
+@pytest.mark.parametrize('scene', [both, without_depth])
+def test_what_is_put_off_until_the_answer_is_out_changes_no_answer(scene):
     answers = []
     for settles in (None, True, False):
         targets = TargetSet('metric', MetricParameters())
         assert targets.metric is not None
         targets.metric.puts_off = settles is not None
-        numbers = [targets.add(both(0), one(0).box) for one in (left, right)]
+        numbers = [targets.add(scene(0), one(0).box) for one in (left, right)]
         seen, waited = [], 0
         for i in range(1, 26):
-            seen.append(targets.update(both(i)))
+            seen.append(targets.update(scene(i)))
             looks = [targets.metric._followers[n]._look for n in numbers]
-            waited += any(look._to_learn is not None for look in looks)
+            waited += any(look._put_off is not None for look in looks)
             if settles:
                 targets.metric.settle()
-                assert all(look._to_learn is None for look in looks)
+                assert all(look._put_off is None for look in looks)
         assert (waited > 0) == (settles is not None)
         # At the end depth is silent, and the look that was learned is asked.
-        blind = [dataclasses.replace(both(i), depth=None) for i in range(26, 30)]
-        answers.append([seen, [targets.update(frame) for frame in blind]])
+        answers.append([seen, [targets.update(without_depth(i)) for i in range(26, 30)]])
     assert answers[0] == answers[1] == answers[2]
+
+
+@pytest.mark.parametrize(('rate', 'turns'), [(30, 1), (10, 3), (5, 4)])
+def test_targets_followed_by_their_look_take_turns_at_learning_and_at_being_searched_for(
+    rate: int, turns: int, monkeypatch: pytest.MonkeyPatch
+):
+    """What all cost in a frame is then bounded, and none waits for longer than the others."""
+    learned: list[float] = []
+    searched: list[object] = []
+    learn, search = Appearance.learn, ByLook._searched
+
+    def learning(appearance, color, cx, cy, scale, seconds):
+        learned.append(seconds)
+        learn(appearance, color, cx, cy, scale, seconds)
+
+    def searching(look, *args):
+        searched.append(look)
+        return search(look, *args)
+
+    monkeypatch.setattr(Appearance, 'learn', learning)
+    monkeypatch.setattr(ByLook, '_searched', searching)
+    shown, hidden = np.zeros((ROWS, COLS, 3), np.uint8), np.zeros((ROWS, COLS, 3), np.uint8)
+    boxes = [Box(20 + 60 * k, 60, 20, 30) for k in range(4)]
+    for k in range(4):
+        paint = np.random.default_rng(k).integers(0, 256, (6, 4, 3), np.uint8)
+        shown[60:90, 20 + 60 * k : 40 + 60 * k] = np.kron(paint, np.ones((5, 5, 1), np.uint8))
+    targets = TargetSet('metric')
+    numbers = [targets.add(Frame(shown, None, 0), box) for box in boxes]
+    learned.clear()
+    for i in range(1, 13):
+        tracks = targets.update(Frame(shown, None, round(1e9 * i / rate)))
+        for number, box in zip(numbers, boxes, strict=True):
+            assert tracks[number].box is not None
+            assert tracks[number].box.iou(box) > 0.9
+        assert len(learned) == turns * i
+    assert not searched
+    # All the time since a target was last learned from is in the weight of the next sample.
+    assert sum(learned) == pytest.approx(12 / rate * 4, rel=0.15)
+    for i in range(13, 26):
+        tracks = targets.update(Frame(hidden, None, round(1e9 * i / rate)))
+        assert all(track.box is None for track in tracks.values())
+    searched.clear()
+    for i in range(26, 38):
+        targets.update(Frame(hidden, None, round(1e9 * i / rate)))
+    assert len(searched) == 12 * turns
+    assert len(set(searched)) == 4
+    assert all(searched.count(look) == 3 * turns for look in searched)
+    for i in range(38, 42):
+        tracks = targets.update(Frame(shown, None, round(1e9 * i / rate)))
+    assert all(track.box is not None for track in tracks.values())
 
 
 # -- further cues ---------------------------------------------------------------------------------

@@ -11,7 +11,9 @@ from depth where there is any on the target, else from a filter over scale.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import cv2
 import numpy as np
@@ -118,11 +120,18 @@ class ByLook:
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
+        self._turn = True
         self._unlearned = 0.0
-        self._to_learn: tuple[Frame, Box, float] | None = None
+        self._put_off: Callable[[], None] | None = None
 
-    def step(self, frame: Frame, dt: float) -> Look | None:
+    def step(self, frame: Frame, dt: float, turn: bool = True) -> Look | None:
         """Look for the target in the next frame, ``dt`` seconds later.
+
+        Args:
+            frame: the frame.
+            dt: seconds.
+            turn: whether it may be searched for in the image, and learned from. Without, it is
+                looked at where it is expected, and one that is hidden not at all.
 
         Returns:
             Where it is, or None where it is hidden. :meth:`take` or :meth:`refuse` must follow
@@ -130,6 +139,9 @@ class ByLook:
         """
         parameters = self._parameters
         self._follow_size(frame)
+        self._turn = turn
+        if self._hidden and not turn:
+            return None
         small = self._small = _small(frame)
         if self._hidden:
             sighting = self._searched(frame, small, None)
@@ -138,7 +150,7 @@ class ByLook:
             if self._depthless(frame):
                 self._flow_on(frame)
             sighting = self._look_at(frame, small, self._cx, self._cy)
-            if dt > LARGE_STEP and sighting.ratio < UNSURE:
+            if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
                     sighting = other
@@ -150,18 +162,25 @@ class ByLook:
         return self._found(frame, sighting, dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
-        """Learn from what :meth:`step` found."""
+        """Have :meth:`settle` learn from what :meth:`step` found."""
+        self._put_off = partial(self._taken, frame, look, dt)
+
+    def _taken(self, frame: Frame, look: Look, dt: float) -> None:
         if look.ratio > self._parameters.seen_ratio:
-            self._appearance.learn(frame.color, self._cx, self._cy, self._scale, dt)
-            rate = min(MAX_RATE, SCALE_RATE * dt / FRAME)
-            self._scales.learn(
-                frame.color, self._cx, self._cy, look.box.width, look.box.height, rate
-            )
+            self._unlearned += dt
+            if self._turn:
+                self._learn(frame, look.box, self._unlearned)
+                self._unlearned = 0.0
             self._appearance.remember_peak(look.peak, dt)
             self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
         else:
             self._appearance.remember_peak(look.peak, 0.3 * dt)
         self._keep(frame)
+
+    def _learn(self, frame: Frame, box: Box, seconds: float) -> None:
+        self._appearance.learn(frame.color, self._cx, self._cy, self._scale, seconds)
+        rate = min(MAX_RATE, SCALE_RATE * seconds / FRAME)
+        self._scales.learn(frame.color, self._cx, self._cy, box.width, box.height, rate)
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
@@ -175,21 +194,20 @@ class ByLook:
         return self._found(frame, sighting, dt)
 
     def attend(self, frame: Frame, box: Box, dt: float, interval: float) -> None:
-        """Have :meth:`settle` learn from a target found by other means.
-
-        It must be called before the next frame. No more often than every ``interval``.
-        """
+        """Have :meth:`settle` learn from a target found by other means, every ``interval``."""
         self._unlearned += dt
         if self._unlearned < interval:
             return
-        self._to_learn = frame, box, self._unlearned
+        self._put_off = partial(self._attended, frame, box, self._unlearned)
         self._unlearned = 0.0
 
     def settle(self) -> None:
-        """Learn what :meth:`attend` asked for."""
-        if self._to_learn is None:
-            return
-        (frame, box, seconds), self._to_learn = self._to_learn, None
+        """Learn what :meth:`take` or :meth:`attend` put off; to be called before the next frame."""
+        put_off, self._put_off = self._put_off, None
+        if put_off is not None:
+            put_off()
+
+    def _attended(self, frame: Frame, box: Box, seconds: float) -> None:
         self._follow_size(frame)
         self._place(box)
         self._appearance.attend(frame.color, self._cx, self._cy, self._scale, seconds)
@@ -202,6 +220,7 @@ class ByLook:
             image: ``(h, w, 3)`` uint8 BGR.
             mask: ``(h, w)`` bool with a pixel at least.
         """
+        self.settle()
         return float(self._appearance.posterior(image)[mask].mean())
 
     def refuse(self, frame: Frame, look: Look) -> None:

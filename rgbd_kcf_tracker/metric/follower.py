@@ -180,8 +180,13 @@ class Follower:
         if self._look is not None:
             self._look.settle()
 
+    @property
+    def by_look(self) -> bool:
+        """Whether it is followed by its look, as depth has not told it from the rest."""
+        return self._surface is None
+
     def step(
-        self, frame: Frame, account: Account | None, view: DepthView | None, dt: float
+        self, frame: Frame, account: Account | None, view: DepthView | None, dt: float, turn: bool
     ) -> Track:
         """Follow the target into the next frame, ``dt`` seconds later.
 
@@ -190,6 +195,7 @@ class Follower:
             account: what it shows, None where it has no depth.
             view: the last depth there was, None where there never was any.
             dt: seconds.
+            turn: whether a target followed by its look may be searched for and learned from.
         """
         self._account = account
         self.seen = self.glimpsed = None
@@ -199,7 +205,7 @@ class Follower:
         if self._look is not None:
             self._look.response = None
         if self._surface is None:
-            track = self._by_look(frame, account, dt)
+            track = self._by_look(frame, account, dt, turn)
         else:
             track = self._by_surface(frame, account, view, dt, self._surface)
         self.response = None if self._look is None else self._look.response
@@ -387,14 +393,14 @@ class Follower:
 
     # -- by look ----------------------------------------------------------------------------------
 
-    def _by_look(self, frame: Frame, account: Account | None, dt: float) -> Track:
+    def _by_look(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Track:
         assert self._look is not None
         self._follow_size(frame)
         if account is not None and account.scene.motion is not None:
             self._carried = True
             if self._stood is not None:
                 self._stood.carried(account.scene.motion)
-        look = self._look.step(frame, dt)
+        look = self._look.step(frame, dt, turn)
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
