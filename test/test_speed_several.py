@@ -10,12 +10,14 @@ import io
 
 import pytest
 
+from rgbd_kcf_tracker import Frame, TargetSet, Track
 from rgbd_kcf_tracker.cli import bench
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation.contenders import variant
 from rgbd_kcf_tracker.evaluation.speed import Setting
 from rgbd_kcf_tracker.evaluation.speed_several import (
+    Case,
     SpeedOfSeveral,
     measure_several,
     side_by_side,
@@ -35,6 +37,15 @@ def test_everyone_is_in_view_all_the_time() -> None:
             assert truth.visible is not None
             assert truth.visible.height == pytest.approx(300, rel=0.15)
     assert scene.truths(0)[1].visible != scene.truths(20)[1].visible
+
+
+def test_all_but_the_first_are_gone_where_lost_ones_are_timed() -> None:
+    people, case = 8, Case(lost=True)
+    scene = side_by_side(Setting(960, 540, 300), people, case.untimed + 30, case.lost)
+    for index in range(case.untimed, len(scene), 10):
+        seen = {number for number, truth in scene.truths(index).items() if truth.visible}
+        assert seen == {1}
+    assert sum(truth.visible is not None for truth in scene.truths(0).values()) == people
 
 
 def test_too_many_targets_are_refused() -> None:
@@ -67,6 +78,32 @@ def test_every_number_of_targets_is_timed_on_every_frame() -> None:
     assert measured.reference is not None
 
 
+def test_what_lost_targets_cost_is_of_the_time_when_they_have_gone() -> None:
+    case = Case(lost=True)
+    measured = measure_several([variant('metric')], SMALL, (1, 3), case.untimed + 4, case)
+    (speed,) = measured.speeds
+    assert {n: len(spent) for n, spent in speed.milliseconds.items()} == {1: 4, 3: 4}
+    assert speed.found[1] == 1.0
+    assert speed.found[3] == pytest.approx(1 / 3)
+    with pytest.raises(ParameterError, match=f'give more than {case.untimed}'):
+        measure_several([variant('metric')], SMALL, (1, 3), case.untimed, case)
+
+
+@pytest.mark.parametrize('depth', [True, False])
+def test_trackers_are_given_depth_or_none(depth: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[bool] = []
+    update = TargetSet.update
+
+    def noting(targets: TargetSet, frame: Frame) -> dict[int, Track]:
+        given.append(frame.depth is not None)
+        return update(targets, frame)
+
+    monkeypatch.setattr(TargetSet, 'update', noting)
+    measured = measure_several([variant('kcf')], SMALL, (1, 2), 3, Case(depth=depth))
+    assert given == [depth] * 4
+    assert str(measured.case).endswith('without depth') != depth
+
+
 def test_a_measurement_that_was_stopped_at_once_has_no_times() -> None:
     measured = measure_several([variant('kcf')], SMALL, (1, 2), 6, stopped=lambda: True)
     (speed,) = measured.speeds
@@ -95,6 +132,9 @@ def test_bench_reports_by_number_of_targets_and_what_each_further_one_costs(
         (['--targets', '2', '2'], '--targets is 2 2'),
         (['--targets', '2', '--soak', '30'], 'not both'),
         (['--targets', '20'], 'at most 8'),
+        (['--lost'], 'of --targets'),
+        (['--without-depth'], 'of --targets'),
+        (['--targets', '2', '--lost', '--frames', '30'], 'give more than'),
     ],
 )
 def test_wrong_targets_are_answered_in_a_sentence(

@@ -57,6 +57,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'view, as in 1 2 4 8, and report what each further one costs (default variant: metric)',
     )
     parser.add_argument(
+        '--lost',
+        action='store_true',
+        help='with --targets: all but the first run out of the image and stay away, and the time '
+        'after that counts',
+    )
+    parser.add_argument(
+        '--without-depth', action='store_true', help='with --targets: the same on colour alone'
+    )
+    parser.add_argument(
         '--frames', metavar='N', type=int, default=180, help='frames of each (default 180)'
     )
     parser.add_argument(
@@ -75,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
         os.environ.setdefault(name, '1')
     from rgbd_kcf_tracker.evaluation.contenders import variant
     from rgbd_kcf_tracker.evaluation.speed import Setting, measure, soak
-    from rgbd_kcf_tracker.evaluation.speed_several import measure_several
+    from rgbd_kcf_tracker.evaluation.speed_several import Case, measure_several
     from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
 
     sizes = args.sizes or (','.join(SIZES) if args.targets is None else SIZE_OF_SEVERAL)
@@ -90,12 +99,21 @@ def run(args: argparse.Namespace) -> int:
             raise ParameterError(f'--targets is {given}: give numbers from 1, each once')
         several = [variant(name.strip()) for name in (args.variants or DEFAULT_VARIANT).split(',')]
         reference = _contender(REFERENCE, variant)
+        case = Case(args.lost, not args.without_depth)
         for setting in progress(settings, len(settings), NAME):
             speeds = measure_several(
-                several, setting, args.targets, args.frames, reference, lambda: interrupts.asked
+                several,
+                setting,
+                args.targets,
+                args.frames,
+                case,
+                reference,
+                lambda: interrupts.asked,
             )
             _print(_tables_of_several(speeds), args.csv)
         return 0
+    if args.lost or args.without_depth:
+        raise ParameterError('--lost and --without-depth are of --targets: give it, as in 1 2 4 8')
     contenders = _contenders(args.variants, variant)
     if args.soak is not None:
         if args.soak < FEWEST_FRAMES:
@@ -164,7 +182,9 @@ def _tables_of_several(measured: SpeedsOfSeveral) -> list[Table]:
     )
     names = ('tracker', 'median ms', 'mean ms', 'median / CSRT', 'mean / CSRT')
     return [
-        Table('speed_targets', f'{measured.setting}, people', columns, by_targets, digits=2),
+        Table(
+            'speed_targets', f'{measured.setting}, {measured.case}', columns, by_targets, digits=2
+        ),
         Table('speed_further', 'each further target', names, further, digits=3),
     ]
 

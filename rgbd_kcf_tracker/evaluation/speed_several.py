@@ -6,11 +6,13 @@
 In one simulated scene as many people as the most targets stand side by side, all in view all the
 time, and step from side to side; of them one is followed, or two, and so on, turn by turn on the
 same frames. What a frame shows is thus the same for all counts, and the slope of the times over
-the counts is the cost of each further target.
+the counts is the cost of each further target. The same can be asked of targets that are lost, all
+but one having gone away, and of targets without depth.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import gc
 import itertools
 import math
@@ -42,15 +44,44 @@ DEEP = 0.25
 """Metres by which every other person stands farther away."""
 BEHIND = 1.5
 """Metres from the people to the wall, at the least."""
+LEAVE, GONE = 0.5, 2.0
+"""Seconds at which those who are to be lost begin to run, once they have been learned, and at which
+they have gone: nobody runs faster than about 4 m/s."""
 
 
-def side_by_side(setting: Setting, people: int, count: int) -> SimulatedSequence:
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What is asked of several targets.
+
+    Attributes:
+        lost: whether all but the first run out of the image and stay away; what is timed is then
+            the time after that. Else all are in view all the time.
+        depth: whether there is depth.
+    """
+
+    lost: bool = False
+    depth: bool = True
+
+    def __str__(self) -> str:
+        gone = ', all but the first gone' if self.lost else ''
+        return f'people{gone}{"" if self.depth else ", without depth"}'
+
+    @property
+    def untimed(self) -> int:
+        """Frames before those that are timed: the start, or until all have gone."""
+        return math.ceil(GONE * RATE) if self.lost else 1
+
+
+def side_by_side(
+    setting: Setting, people: int, count: int, lost: bool = False
+) -> SimulatedSequence:
     """A scene of people who step from side to side, each in a lane of their own.
 
     Args:
         setting: size of the image, and about the height of a person in it, in pixels.
         people: how many.
         count: frames.
+        lost: whether all but the first run out of the image.
 
     Raises:
         ParameterError: where so many do not fit beside each other.
@@ -74,6 +105,11 @@ def side_by_side(setting: Setting, people: int, count: int) -> SimulatedSequence
         x, z = (k + 0.5 - people / 2) * lane, far + DEEP * (k % 2)
         times = np.arange(0.0, seconds + 1.0, 0.6) + 0.07 * k
         way = [(t, x + STEP_ASIDE * (-1) ** (i + k), z) for i, t in enumerate(times)]
+        if lost and k > 0:
+            # Away from the first: none of them is to be taken for him.
+            outside = setting.width / 2 * z / camera.fx + LANE
+            way = [point for point in way if point[0] < LEAVE]
+            way += [(LEAVE, x, z), (GONE, outside, z)]
         facing = [(0.0, stage.uniform(-math.pi, math.pi))]
         actors.append(stage.walk(stage.person(), way, heading=facing))
     high = 0.55 * STATURE
@@ -83,14 +119,15 @@ def side_by_side(setting: Setting, people: int, count: int) -> SimulatedSequence
     return SimulatedSequence(scene, 'side by side', SEED, RATE, offsets, size, camera)
 
 
-def _samples(scene: SimulatedSequence) -> Iterator[Sample]:
+def _samples(scene: SimulatedSequence, depth: bool) -> Iterator[Sample]:
     for simulated in scene:
+        frame = simulated.frame if depth else dataclasses.replace(simulated.frame, depth=None)
         people = tuple(
             Person(number, truth.visible)
             for number, truth in simulated.truths.items()
             if truth.visible is not None
         )
-        yield Sample(simulated.frame, simulated.visible, people=people)
+        yield Sample(frame, simulated.visible, people=people)
 
 
 class _SeveralPass(Pass[TargetSet, dict[int, Track]]):
@@ -114,8 +151,8 @@ class SpeedOfSeveral:
 
     Attributes:
         contender: its name.
-        milliseconds: of each frame but the first, by number of targets.
-        found: share of its answers with a box, 0 to 1, by number of targets.
+        milliseconds: of each timed frame, by number of targets.
+        found: share of its answers to these with a box, 0 to 1, by number of targets.
     """
 
     contender: str
@@ -147,11 +184,13 @@ class SpeedsOfSeveral:
 
     Attributes:
         setting: the sizes.
+        case: what was asked.
         speeds: of each tracker.
         reference: median of another tracker of one target on the same frames, None without.
     """
 
     setting: Setting
+    case: Case
     speeds: tuple[SpeedOfSeveral, ...]
     reference: float | None
 
@@ -161,6 +200,7 @@ def measure_several(
     setting: Setting,
     targets: Sequence[int],
     count: int,
+    case: Case = Case(),
     reference: Contender | None = None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> SpeedsOfSeveral:
@@ -172,17 +212,21 @@ def measure_several(
         contenders: variants.
         setting: sizes.
         targets: how many are to be followed, each number once.
-        count: frames.
+        count: frames, more than are not timed.
+        case: what happens in them.
         reference: a tracker that follows one target on the same frames.
         stopped: whether to end early.
 
     Raises:
-        ParameterError: where so many people do not fit, or a contender follows one target only.
+        ParameterError: where so many people do not fit, a contender follows one target only, or no
+            frame would be timed.
     """
+    if count <= case.untimed:
+        raise ParameterError(f'{count} frames of {case}: give more than {case.untimed}')
     several = {c.name: {n: _SeveralPass(c.make_set(), n) for n in targets} for c in contenders}
     others = [] if reference is None else [OnePass(reference.make())]
     passes = [one for each in several.values() for one in each.values()]
-    samples = _samples(side_by_side(setting, max(targets), count))
+    samples = _samples(side_by_side(setting, max(targets), count, case.lost), case.depth)
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     gc.collect()
@@ -196,15 +240,15 @@ def measure_several(
     speeds = tuple(
         SpeedOfSeveral(
             name,
-            {n: tuple(one.milliseconds[1:]) for n, one in each.items()},
-            {n: _found(one) for n, one in each.items()},
+            {n: tuple(one.milliseconds[case.untimed :]) for n, one in each.items()},
+            {n: _found(one.tracks[case.untimed :]) for n, one in each.items()},
         )
         for name, each in several.items()
     )
-    spent = [ms for one in others for ms in one.milliseconds[1:]]
-    return SpeedsOfSeveral(setting, speeds, float(np.median(spent)) if spent else None)
+    spent = [ms for one in others for ms in one.milliseconds[case.untimed :]]
+    return SpeedsOfSeveral(setting, case, speeds, float(np.median(spent)) if spent else None)
 
 
-def _found(one: _SeveralPass) -> float:
-    boxes = [track.box for tracks in one.tracks for track in tracks.values()]
+def _found(answers: Sequence[dict[int, Track]]) -> float:
+    boxes = [track.box for tracks in answers for track in tracks.values()]
     return sum(box is not None for box in boxes) / max(len(boxes), 1)
