@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
 
 LARGE_STEP = 0.08
@@ -50,6 +51,19 @@ SCALE_RANGE = (0.1, 10.0)
 """Times its first size that a target is at the least and at the most: a Kinect v2 sees from 0.5 to
 4.5 m, and so shows the same thing at most nine times as large. It keeps a lost size from running
 off."""
+SAME_HEIGHT, LIKE_FILTER = 1.25, 1.4
+"""Times, or parts of, the height of the last box and of the filter's that an outline is high at the
+most: who sits down or comes near is outlined all along at 5 Hz and more. What is higher by more is
+the person who carries the target, and the target a part of him."""
+OFF_MIDDLE = 0.25
+"""Share of the filter's width by which its middle may be off that of what moves: arms and legs move
+the latter so far; from there the filter has stayed behind."""
+TOLD, WELL_TOLD = 0.3, 0.5
+"""Share of an outline's pixels that differ from the backdrop from which the filter is brought to
+its middle, and to its height: less is an arm."""
+OUTLINE_TIME = 0.45
+"""Seconds in which the filter follows the outline's height: longer than a step, shorter than it
+takes to sit down."""
 SEARCH_WIDTH = 240
 """Columns of the image in which colours are searched, about those of the view of depth: it costs
 the same at any resolution."""
@@ -117,6 +131,10 @@ class ByLook:
         self._small = _small(frame)
         self._elsewhere.keep(self._small, box.over(_step_of(frame)))
         self._flow = TextureFlow()
+        self._last_box = box
+        self._backdrop: Backdrop | None = None
+        if self._depthless(frame):
+            self._backdrop = Backdrop(_averaged(frame), box.over(_step_of(frame)))
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
@@ -143,6 +161,8 @@ class ByLook:
         if self._hidden and not turn:
             return None
         small = self._small = _small(frame)
+        if self._backdrop is not None:
+            self._backdrop.see(_averaged(frame), self._last_box.over(_step_of(frame)))
         if self._hidden:
             sighting = self._searched(frame, small, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
@@ -157,9 +177,9 @@ class ByLook:
             self._hidden = sighting.ratio < parameters.hidden_ratio
         self.response = sighting.ratio
         if self._hidden:
-            self._flow.forget()
+            self._lose(frame)
             return None
-        return self._found(frame, sighting, dt)
+        return self._outlined(frame, self._found(frame, sighting, dt), dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
@@ -169,18 +189,21 @@ class ByLook:
         if look.ratio > self._parameters.seen_ratio:
             self._unlearned += dt
             if self._turn:
-                self._learn(frame, look.box, self._unlearned)
+                self._learn(frame, self._unlearned)
                 self._unlearned = 0.0
             self._appearance.remember_peak(look.peak, dt)
             self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
         else:
             self._appearance.remember_peak(look.peak, 0.3 * dt)
+        self._last_box = look.box
+        if self._backdrop is not None:
+            self._backdrop.learn(look.box.over(_step_of(frame)))
         self._keep(frame)
 
-    def _learn(self, frame: Frame, box: Box, seconds: float) -> None:
+    def _learn(self, frame: Frame, seconds: float) -> None:
         self._appearance.learn(frame.color, self._cx, self._cy, self._scale, seconds)
         rate = min(MAX_RATE, SCALE_RATE * seconds / FRAME)
-        self._scales.learn(frame.color, self._cx, self._cy, box.width, box.height, rate)
+        self._scales.learn(frame.color, self._cx, self._cy, *self._size, rate)
 
     def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
         """Look only about where the target is expected, ``box``; None where it is not seen."""
@@ -227,7 +250,12 @@ class ByLook:
         """What :meth:`step` found is something else: the target is hidden."""
         self._hidden = True
         self._elsewhere.refuse(self._small, look.box.over(_step_of(frame)))
+        self._lose(frame)
+
+    def _lose(self, frame: Frame) -> None:
         self._flow.forget()
+        if self._backdrop is not None:
+            self._backdrop.learn(self._last_box.over(_step_of(frame)))
 
     def _follow_size(self, frame: Frame) -> None:
         """Carry the target over to a stream whose image size has changed."""
@@ -239,6 +267,8 @@ class ByLook:
         self._flow.forget()
         self._elsewhere.forget()
         self._cx, self._cy = self._cx * across, self._cy * down
+        b = self._last_box
+        self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
         self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
@@ -326,6 +356,28 @@ class ByLook:
         box = Box.from_center(self._cx, self._cy, *self._size)
         return Look(box, sighting.ratio, sighting.peak, depth)
 
+    def _outlined(self, frame: Frame, look: Look, dt: float) -> Look:
+        """What the look has found, with arms and legs where they show before what stands still."""
+        if self._backdrop is None:
+            return look
+        step, filtered = _step_of(frame), look.box
+        outline = self._backdrop.outline(filtered.over(step), self._appearance.posterior)
+        if outline is None:
+            return look
+        box = outline.box.over(1 / step)
+        change, apart = box.height / self._last_box.height, box.height / filtered.height
+        if max(change, 1 / change) > SAME_HEIGHT or max(apart, 1 / apart) > LIKE_FILTER:
+            return look
+        if outline.told > TOLD:
+            off, most = outline.cx * step - self._cx, OFF_MIDDLE * filtered.width
+            self._cx += off - float(np.clip(off, -most, most))
+        # Of what the image cuts off, nothing tells how high it is.
+        if outline.told > WELL_TOLD and box.y > step and box.bottom < frame.height - step:
+            share = 1 - float(np.exp(-dt / OUTLINE_TIME))
+            self._scale = float(np.clip(self._scale * apart**share, *SCALE_RANGE))
+            self._cy += share * (box.cy - filtered.cy)
+        return dataclasses.replace(look, box=box)
+
     def _rescale(self, frame: Frame, depth: float | None, sighting: Sighting, dt: float) -> None:
         """Follow the size: by depth where it is known, else by the look."""
         if self._first_depth and self._depth and depth and 0.5 < depth / self._depth < 2:
@@ -340,6 +392,15 @@ class ByLook:
 
 def _step_of(frame: Frame) -> int:
     return max(1, round(frame.width / SEARCH_WIDTH))
+
+
+def _averaged(frame: Frame) -> Image:
+    """A frame's colours as small as :func:`_small`'s, each the mean of what it stands for."""
+    step = _step_of(frame)
+    cols, rows = max(1, frame.width // step), max(1, frame.height // step)
+    whole = frame.color[: rows * step, : cols * step]
+    image: Image = cv2.resize(whole, (cols, rows), interpolation=cv2.INTER_AREA)
+    return image
 
 
 def _small(frame: Frame) -> Image:

@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.pose import Pose
 
 FloatArray = npt.NDArray[np.float64]
 GrayImage = npt.NDArray[np.uint8]
+Points = npt.NDArray[np.floating]
 
 CHANGED = 14
 CHANGED_SHARE = 0.06
@@ -78,12 +79,34 @@ class EgoMotion:
         self._gray, self._view = gray, view
         if last is None or last_view is None or last.shape != gray.shape:
             return None
-        change = cv2.absdiff(gray[::2, ::2], last[::2, ::2])
-        # A change of light changes all alike and is no motion.
-        change = cv2.absdiff(change, np.full_like(change, upper_median(change)))
-        if np.count_nonzero(change > CHANGED) < CHANGED_SHARE * change.size:
+        if not changed(last, gray):
             return None
         return _told(last, last_view, gray, others)
+
+
+def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | None = None) -> bool:
+    """Whether so much of a picture has changed that its camera may have moved.
+
+    Args:
+        last: ``(h, w)`` uint8, the picture before.
+        gray: that of now.
+        among: ``(h, w)`` bool, the pixels that are asked; all without.
+    """
+    change = cv2.absdiff(gray[::2, ::2], last[::2, ::2])
+    # A change of light changes all alike and is no motion.
+    change = cv2.absdiff(change, np.full_like(change, upper_median(change)))
+    moved = change > CHANGED
+    asked = moved.size
+    if among is not None:
+        moved &= among[::2, ::2]
+        asked = np.count_nonzero(among[::2, ::2])
+    return bool(np.count_nonzero(moved) >= max(CHANGED_SHARE * asked, 1))
+
+
+def stands(first: Points, second: Points) -> bool:
+    """Whether the camera stands still, by where its corners ``(n, 2)`` were and are."""
+    still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
+    return bool(still >= max(LEAST_CORNERS, LEAST_STILL * len(first)))
 
 
 def upper_median(values: GrayImage) -> int:
@@ -106,8 +129,7 @@ def _told(
     first, second = corners[good].astype(np.float64), found[good].astype(np.float64)
     if len(first) < LEAST_CORNERS:
         return Lost()
-    still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
-    if still >= max(LEAST_CORNERS, LEAST_STILL * len(first)):
+    if stands(first, second):
         return None
     k = last_view.intrinsics
     z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)

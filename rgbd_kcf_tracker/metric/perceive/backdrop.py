@@ -1,0 +1,257 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What moves before a camera that stands still, told by colour alone.
+
+Where depth says nothing, the backdrop is what has looked the same for some frames while the target
+was elsewhere. What differs from it moves, and the piece of that which lies in the target's box is
+the target with its arms and legs, which a filter's box of fixed proportions cuts off. Nothing is
+said of what the target has covered since it was chosen, nor once the camera has moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.features.optical_flow import followed
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_of
+from rgbd_kcf_tracker.metric.perceive.ego_motion import (
+    CORNER_DISTANCE,
+    CORNER_QUALITY,
+    CORNERS,
+    LEAST_CORNERS,
+    changed,
+    stands,
+)
+
+Image = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
+Posterior = Callable[[Image], npt.NDArray[np.float32]]
+
+DIFFERS = 14
+"""Levels of a channel by which a pixel differs from the backdrop. Of a picture made small by means
+over areas, noise is a level or two; a shadow is more, and belongs to who casts it as well as any
+rule of colour tells it from dark clothes."""
+SAME = DIFFERS // 2
+"""Levels up to which a pixel has not changed from one frame to the next: half, so that what creeps
+by less than :data:`DIFFERS` in a frame is not learned."""
+STABLE = 2
+"""Frames in a row without a change after which a pixel is the backdrop: at the pace of a walk none
+of somebody's clothes but the plainest stays alike for longer."""
+MARGIN = 1.15
+"""Sides of the box, in units of the target's, inside which nothing is learned unless its outline is
+known: an arm or a foot sticks out by so much."""
+LIT = 4
+"""Every so many pixels tell of the light: some thousand, enough for a median."""
+LEAST_KNOWN = 0.5
+"""Share of the pixels between the box's side and the outline that must be known for the box to end
+at the outline: most of them."""
+OTHERS = 0.15
+"""Share of a piece that was another's a frame ago from which two have met: some of it is where the
+other had his arm or his shadow."""
+GROWN = 1.4
+"""Times its area when it was alone above which a piece is still two who have met: two people are
+twice as much, and who stretches out an arm has a tenth more."""
+PARTED = 20
+"""Frames in which two who have met may part again, the one hidden by the other between: as long as
+somebody takes to pass before another at the pace of a walk and 10 Hz."""
+SPECK = 4
+"""Pixels of a piece below which it is noise."""
+_ROUND = np.ones((3, 3), np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """The piece of a picture that moves and is the target.
+
+    Attributes:
+        box: about it, in pixels of the picture; where the backdrop is not known, the end of the box
+            that was asked about.
+        cx: column of the middle of those of its pixels that differ from the backdrop.
+        told: share of these among all, 0 to 1; the others are the target's by their colours.
+    """
+
+    box: Box
+    cx: float
+    told: float
+
+
+class Backdrop:
+    """The colours of what stands still behind one target. Not to be shared between threads.
+
+    Args:
+        image: ``(h, w, 3)`` uint8 BGR, the first picture, made small by means over areas.
+        box: the target in it, in its pixels.
+    """
+
+    def __init__(self, image: Image, box: Box) -> None:
+        self._start(image, cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), box)
+
+    def _start(self, image: Image, gray: Image, box: Box) -> None:
+        shape = image.shape[:2]
+        self._last, self._gray, self._colors = image, gray, image.astype(np.float32)
+        self._known, self._differs, self._others = (np.zeros(shape, np.bool_) for _ in range(3))
+        self._same = np.zeros(shape, np.uint8)
+        self._area = self._met = 0
+        self._mine = self._within(box.scaled(MARGIN))
+
+    def see(self, image: Image, box: Box) -> None:
+        """Take the next picture.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR; of another size, all starts again.
+            box: where the target last was.
+        """
+        gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        around = self._within(box.scaled(MARGIN)) if image.shape == self._last.shape else None
+        if around is None or self._camera_moved(gray, ~around):
+            self._start(image, gray, box)
+            return
+        self._same += self._same < 255
+        self._same[cv2.absdiff(image, self._last).max(axis=2) > SAME] = 0
+        self._follow_light(image)
+        apart = cv2.absdiff(image, cv2.convertScaleAbs(self._colors)).max(axis=2)
+        self._differs = self._known & (apart > DIFFERS)
+        # Until an outline tells the target from the rest, all that moves may be a part of it.
+        self._mine = self._differs | around
+        self._last, self._gray = image, gray
+
+    def learn(self, box: Box) -> None:
+        """Take what has not changed for the backdrop, but for the target, which is in ``box``."""
+        mine = self._mine | self._within(box.scaled(MARGIN))
+        self._same[self._within(box.scaled(MARGIN))] = 0
+        still = (self._same >= STABLE) & ~mine
+        np.copyto(self._colors, self._last, where=still[:, :, None])
+        self._known |= still
+        self._others = self._differs & ~mine
+
+    def outline(self, box: Box, posterior: Posterior) -> Outline | None:
+        """The target's outline in the last picture.
+
+        Args:
+            box: where it is by its look.
+            posterior: how likely each pixel of an image is the target's by its colour.
+
+        Returns:
+            None where nothing moves there, or two have met who cannot be told apart.
+        """
+        part = self._part(
+            Box.from_center(box.cx, box.cy, box.width + 1.2 * box.height, 1.8 * box.height)
+        )
+        known, differs = self._known[part], self._differs[part]
+        if not differs.any():
+            return None
+        rows, cols = part
+        b = Box(box.x - cols.start, box.y - rows.start, box.width, box.height)
+        own, about = (part_of(known.shape, *_sides(each)) for each in (b, b.scaled(MARGIN)))
+        body = differs.copy()
+        body[own] |= ~known[own] & (posterior(self._last[part][own]) > 0.5)
+        # An arm goes on behind what is not known.
+        joined = body.copy()
+        joined[about] |= ~known[about]
+        joined = cv2.morphologyEx(joined.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND)
+        count, labels = cv2.connectedComponents(joined, connectivity=8)
+        areas = np.bincount(labels.ravel(), minlength=count)
+        inside = np.bincount(labels[about].ravel(), minlength=count)
+        inside[0] = 0
+        if not inside.any():
+            return None
+        mine = (inside > 0.5 * areas) & (areas >= SPECK)
+        mine[int(np.argmax(inside))] = True
+        body &= mine[labels]
+        if not body.any() or self._two(body, self._others[part]):
+            return None
+        self._mine[:] = False
+        self._mine[part] = cv2.dilate(body.astype(np.uint8), _ROUND) > 0
+        end = _ended(_bounds(body), b, known)
+        told = body & differs
+        columns = np.count_nonzero(told, axis=0)
+        area = int(columns.sum())
+        middle = columns @ np.arange(len(columns)) / max(area, 1) + 0.5
+        return Outline(
+            Box(end.x + cols.start, end.y + rows.start, end.width, end.height),
+            float(middle) + cols.start,
+            area / int(np.count_nonzero(body)),
+        )
+
+    # -- parts ------------------------------------------------------------------------------------
+
+    def _part(self, box: Box) -> tuple[slice, slice]:
+        return part_of(self._last.shape, *_sides(box))
+
+    def _within(self, box: Box) -> Mask:
+        mask = np.zeros(self._last.shape[:2], np.bool_)
+        mask[self._part(box)] = True
+        return mask
+
+    def _camera_moved(self, gray: Image, outside: Mask) -> bool:
+        """Whether the camera has moved, or nothing tells that it has not."""
+        if not changed(self._gray, gray, outside):
+            return False
+        corners = cv2.goodFeaturesToTrack(
+            self._gray,
+            CORNERS,
+            CORNER_QUALITY,
+            CORNER_DISTANCE,
+            mask=outside.astype(np.uint8) * 255,
+        )
+        if corners is None or len(corners) < LEAST_CORNERS:
+            return True
+        corners = corners.reshape(-1, 2)
+        found, good = followed(self._gray, gray, corners)
+        return not stands(corners[good], found[good])
+
+    def _follow_light(self, image: Image) -> None:
+        """Light that changes changes all alike: the median pixel is what it was."""
+        now = image[::LIT, ::LIT].astype(np.float32) + 1
+        gain = np.median(now / (self._colors[::LIT, ::LIT] + 1), axis=(0, 1))
+        self._colors *= gain.astype(np.float32)
+
+    def _two(self, body: Mask, others: Mask) -> bool:
+        """Whether a piece is the target and somebody else whom it has met."""
+        area = int(np.count_nonzero(body))
+        others = cv2.dilate(others.astype(np.uint8), _ROUND) > 0
+        if np.count_nonzero(body & others) > OTHERS * area:
+            self._met = PARTED
+        if self._met and area > GROWN * self._area:
+            return True
+        self._met = max(0, self._met - 1)
+        if not self._met:
+            self._area = area
+        return False
+
+
+def _sides(box: Box) -> tuple[float, float, float, float]:
+    return box.x, box.y, box.right, box.bottom
+
+
+def _bounds(mask: Mask) -> Box:
+    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return Box.from_corners(
+        float(cols[0]), float(rows[0]), float(cols[-1] + 1), float(rows[-1] + 1)
+    )
+
+
+def _ended(outline: Box, box: Box, known: Mask) -> Box:
+    """The outline's box, but for sides inside of ``box`` that lie in what is not known."""
+    left, top, right, bottom = _sides(outline)
+    if left > box.x and not _mostly(known, box.x, box.y, left, box.bottom):
+        left = box.x
+    if right < box.right and not _mostly(known, right, box.y, box.right, box.bottom):
+        right = box.right
+    if top > box.y and not _mostly(known, left, box.y, right, top):
+        top = box.y
+    if bottom < box.bottom and not _mostly(known, left, bottom, right, box.bottom):
+        bottom = box.bottom
+    return Box.from_corners(left, top, right, bottom)
+
+
+def _mostly(known: Mask, left: float, top: float, right: float, bottom: float) -> bool:
+    part = known[part_of(known.shape, left, top, right - 1, bottom - 1)]
+    return part.size > 0 and float(part.mean()) > LEAST_KNOWN

@@ -1,0 +1,158 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What moves before a camera that stands still, told by colour alone."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker import Box
+from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
+from rgbd_kcf_tracker.simulation import simulate
+from rgbd_kcf_tracker.targets import TargetSet
+
+RED = (20, 30, 200)
+ROOM = np.random.default_rng(4).integers(60, 120, (90, 160, 3), dtype=np.uint8)
+BODY = Box(10, 20, 14, 50)
+
+
+def red(image: np.ndarray) -> np.ndarray:
+    """How likely a pixel is the target's by its colour."""
+    return (image[:, :, 2].astype(np.float32) > 150).astype(np.float32)
+
+
+def picture(*boxes: Box, room: np.ndarray = ROOM, light: float = 1.0, seed: int = 0) -> np.ndarray:
+    image = room.copy()
+    for box in boxes:
+        image[int(box.y) : int(box.bottom), int(box.x) : int(box.right)] = RED
+    noise = np.random.default_rng(seed).integers(-2, 3, image.shape)
+    return np.clip(light * image.astype(np.float64) + noise, 0, 255).astype(np.uint8)
+
+
+def arm(body: Box) -> Box:
+    return Box(body.right, body.y + 12, 12, 3)
+
+
+def walk(backdrop: Backdrop, steps: range, light: float = 1.0) -> Box:
+    """The body takes two pixels a frame; where it is at the end."""
+    body = BODY
+    for k in steps:
+        body = BODY.moved(2 * k, 0)
+        backdrop.see(picture(body, light=light, seed=k), body)
+        backdrop.outline(body, red)
+        backdrop.learn(body)
+    return body
+
+
+@pytest.fixture
+def walked() -> tuple[Backdrop, Box]:
+    backdrop = Backdrop(picture(BODY), BODY)
+    return backdrop, walk(backdrop, range(1, 16))
+
+
+def test_an_arm_that_no_box_of_fixed_proportions_holds_is_in_the_outline(walked):
+    backdrop, body = walked
+    backdrop.see(picture(body, arm(body), seed=90), body)
+    outline = backdrop.outline(body, red)
+    assert outline is not None
+    assert outline.box == Box.from_corners(body.x, body.y, arm(body).right, body.bottom)
+    assert outline.told > 0.95
+    assert body.cx < outline.cx < body.cx + 2
+
+
+def test_a_box_that_has_stayed_behind_is_told_where_the_target_is(walked):
+    backdrop, body = walked
+    backdrop.see(picture(body, seed=90), body)
+    outline = backdrop.outline(body.moved(-8, 0), red)
+    assert outline is not None
+    assert outline.box == body
+    assert outline.cx == pytest.approx(body.cx, abs=0.5)
+
+
+def test_of_whom_has_not_moved_the_box_stays_and_an_arm_is_added():
+    backdrop = Backdrop(picture(BODY), BODY)
+    for k in range(1, 5):
+        backdrop.see(picture(BODY, seed=k), BODY)
+        assert backdrop.outline(BODY, red) is None
+        backdrop.learn(BODY)
+    for k in range(5, 12):  # long enough for the arm to be learned, were it not the target's
+        backdrop.see(picture(BODY, arm(BODY), seed=k), BODY)
+        outline = backdrop.outline(BODY, red)
+        assert outline is not None
+        assert outline.box == Box.from_corners(BODY.x, BODY.y, arm(BODY).right, BODY.bottom)
+        backdrop.learn(BODY)
+
+
+@pytest.mark.parametrize('light', [0.5, 1.5])
+def test_light_that_changes_is_no_motion(walked, light):
+    backdrop, body = walked
+    for k in range(4):
+        level = light ** ((k + 1) / 4)
+        backdrop.see(picture(body, arm(body), light=level, seed=90 + k), body)
+        outline = backdrop.outline(body, red)
+        assert outline is not None
+        assert outline.box == Box.from_corners(body.x, body.y, arm(body).right, body.bottom)
+        backdrop.learn(body)
+
+
+def test_a_camera_that_has_moved_says_nothing_until_it_stands_again(walked):
+    backdrop, body = walked
+    turned = np.roll(ROOM, 7, axis=1)
+    backdrop.see(picture(body, arm(body), room=turned, seed=90), body)
+    assert backdrop.outline(body, red) is None
+    backdrop.learn(body)
+    for k in range(12):
+        body = body.moved(2, 0)
+        backdrop.see(picture(body, room=turned, seed=91 + k), body)
+        outline = backdrop.outline(body, red)
+        backdrop.learn(body)
+    assert outline is not None
+    assert outline.box == body
+
+
+def test_two_who_have_met_are_told_apart_again_when_they_part(walked):
+    backdrop, body = walked
+    clothes = np.random.default_rng(6).integers(130, 250, (50, 14, 3), dtype=np.uint8)
+    told = {}
+    for k in range(-30, 31, 2):
+        other = body.moved(k, 0)
+        image = picture(seed=100 + k)
+        image[int(other.y) : int(other.bottom), int(other.x) : int(other.right)] = clothes
+        image[int(body.y) : int(body.bottom), int(body.x) : int(body.right)] = RED
+        backdrop.see(image, body)
+        told[k] = backdrop.outline(body, red)
+        backdrop.learn(body)
+    for k in (-30, -20, 20, 30):
+        assert told[k] is not None
+        assert told[k].box == body
+    for k in (-12, -8, 8, 12):
+        assert told[k] is None
+
+
+def test_a_picture_of_another_size_starts_anew(walked):
+    backdrop, body = walked
+    small = picture(body)[::2, ::2]
+    backdrop.see(small, body.over(2))
+    assert backdrop.outline(body.over(2), red) is None
+    backdrop.learn(body.over(2))
+    backdrop.see(small, body.over(2))
+    assert backdrop.outline(body.over(2), red) is None
+
+
+@pytest.mark.parametrize(('scene', 'least'), [('motion', 0.9), ('approach', 0.9)])
+def test_arms_and_legs_and_who_comes_near_are_boxed_without_depth(scene, least):
+    right = []
+    targets, number = TargetSet('metric'), None
+    for simulated in simulate(scene, seed=5, rate_hz=10.0, size=(640, 360)):
+        frame = dataclasses.replace(simulated.frame, depth=None)
+        if number is None:
+            number = targets.add(frame, simulated.visible)
+            continue
+        box, truth = targets.update(frame)[number].box, simulated.visible
+        if truth is not None:
+            right.append(box is not None and box.iou(truth) > 0.5)
+    assert np.mean(right) > least
