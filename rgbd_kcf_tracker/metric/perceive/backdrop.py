@@ -152,9 +152,8 @@ class Backdrop:
         own, about = (part_of(known.shape, *_sides(each)) for each in (b, b.scaled(MARGIN)))
         body = differs.copy()
         body[own] |= ~known[own] & (posterior(self._last[part][own]) > 0.5)
-        # An arm goes on behind what is not known.
-        joined = body.copy()
-        joined[about] |= ~known[about]
+        # What goes on behind what the target has covered is a piece of it.
+        joined = body | ~known
         joined = cv2.morphologyEx(joined.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND)
         count, labels = cv2.connectedComponents(joined, connectivity=8)
         areas = np.bincount(labels.ravel(), minlength=count)
