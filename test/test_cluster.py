@@ -17,13 +17,16 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 import pytest
 
 import rgbd_kcf_tracker
+import rgbd_kcf_tracker.batch.cluster
 from rgbd_kcf_tracker.batch.cluster import Cluster
 from rgbd_kcf_tracker.batch.environment import environment
+from rgbd_kcf_tracker.batch.loop import run_all
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import DatasetError, WorkersError
 from rgbd_kcf_tracker.evaluation import runner
@@ -34,6 +37,7 @@ from rgbd_kcf_tracker.evaluation.jobs import RunOptions
 distributed = pytest.importorskip(
     'distributed', reason="needs Dask: pip install 'rgbd_kcf_tracker[cluster]'"
 )
+dask = pytest.importorskip('dask')
 
 SCENES = [
     'sim:normal,occlusion', '--seeds', '1-2', '--duration', '0.5', '--rate', '10',
@@ -60,9 +64,14 @@ def assert_same(one: Path, other: Path) -> None:
 
 @contextmanager
 def local_cluster(**options) -> Iterator:
-    with distributed.LocalCluster(
-        processes=True, dashboard_address=':0', **{'threads_per_worker': 1, **options}
-    ) as cluster:
+    with (
+        # Where a worker is away 15 s after one died, Dask gives it up; on a busy machine that may
+        # be another one, which died meanwhile.
+        dask.config.set({'distributed.deploy.lost-worker-timeout': '1h'}),
+        distributed.LocalCluster(
+            processes=True, dashboard_address=':0', **{'threads_per_worker': 1, **options}
+        ) as cluster,
+    ):
         yield cluster
 
 
@@ -224,25 +233,87 @@ def test_a_worker_killed_in_mid_run_changes_no_byte(cluster, tmp_path: Path):
     assert one == other
 
 
-def test_a_job_that_kills_every_worker_and_one_that_fails_are_rows(tmp_path: Path):
+@pytest.fixture(scope='module')
+def fragile() -> Iterator:
+    """A cluster that gives a job up when one worker died of it."""
+    with (
+        dask.config.set({'distributed.scheduler.allowed-failures': 0}),
+        local_cluster(n_workers=1) as made,
+    ):
+        yield made
+
+
+def test_a_job_that_kills_every_worker_and_one_that_fails_are_rows(fragile, tmp_path: Path):
     sequences = [
         small('1'),
         Sequence('kills', 'normal', 'sim', kills, 'kills'),
         Sequence('broken', 'normal', 'sim', broken, 'broken'),
         small('2'),
     ]
-    import dask
-
-    with (
-        dask.config.set({'distributed.scheduler.allowed-failures': 1}),
-        local_cluster(n_workers=1) as cluster,
-        Cluster(cluster.scheduler_address) as workers,
-    ):
+    with Cluster(fragile.scheduler_address) as workers:
         failures = runner.run(sequences, [KCF], tmp_path, RunOptions(), workers=workers)
     assert [f.sequence for f in failures] == ['kills', 'broken']
     assert 'worker died each time' in failures[0].reason
     assert 'rgb/000003.png cannot be read' in failures[1].reason
     assert {p.stem for p in (tmp_path / 'results' / 'kcf').glob('*.csv')} == {'1', '2'}
+
+
+class Lost:
+    """A result that kills its worker when it is fetched for the first time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __reduce__(self) -> tuple:
+        marker = self.folder / 'fetched'
+        if not marker.exists():
+            marker.touch()
+            kills()
+        return str, ('found again',)
+
+
+def lost(folder: Path, number: int) -> Lost:
+    """Runs, is lost, kills the worker that runs it for what was lost, and runs once more."""
+    before = len(list(folder.glob('run*')))
+    (folder / f'run{before}').touch()
+    if before == 1:
+        kills()
+    return Lost(folder)
+
+
+def test_a_job_whose_result_is_lost_and_that_then_kills_its_worker_runs_again(
+    fragile, tmp_path: Path
+):
+    with Cluster(fragile.scheduler_address) as workers:
+        (done,) = run_all(partial(lost, tmp_path), [1], workers)
+    assert (done.result, done.error) == ('found again', None)
+
+
+class Unreadable:
+    def __reduce__(self) -> tuple:
+        return int, ('no number',)
+
+
+def unreadable(number: int) -> Unreadable:
+    return Unreadable()
+
+
+def test_a_result_that_cannot_be_read_here_is_an_error(cluster):
+    with Cluster(cluster.scheduler_address) as workers:
+        (done,) = run_all(unreadable, [1], workers)
+    assert isinstance(done.error, ValueError)
+
+
+def test_where_no_worker_is_left_it_is_said(monkeypatch: pytest.MonkeyPatch):
+    for name, value in (('NO_WORKER_S', 0.2), ('_COUNT_AGAIN_S', 0.05)):
+        monkeypatch.setattr(rgbd_kcf_tracker.batch.cluster, name, value)
+    monkeypatch.setattr(rgbd_kcf_tracker.batch.loop, 'LOOK_AGAIN_S', 0.05)
+    with local_cluster(n_workers=1) as made, Cluster(made.scheduler_address) as workers:
+        jobs = run_all(str, count(), workers)
+        assert next(jobs).error is None
+        made.scale(0)
+        with pytest.raises(WorkersError, match=r'no workers for 0\.2 s: what is done is kept'):
+            list(jobs)
 
 
 def test_a_scheduler_that_goes_away_is_one_error_and_what_is_done_is_kept(tmp_path: Path):

@@ -10,6 +10,7 @@ Start one with ``dask scheduler`` and, on every machine, ``dask worker tcp://HOS
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import os
@@ -30,6 +31,10 @@ R = TypeVar('R')
 
 AHEAD = 2
 """Jobs handed out for each thread, so that none waits for the next."""
+
+NO_WORKER_S = 300.0
+"""How long jobs wait for a worker where none is left. A worker that died comes back in seconds,
+unless what started it has given it up: then none ever comes."""
 
 _COUNT_AGAIN_S = 5.0
 _MOST_NAMED = 5
@@ -108,24 +113,40 @@ class Cluster(Workers):
         except BaseException:
             self._client.close()
             raise
-        self._executor = self._client.get_executor(pure=False)
         self._counted = 0.0
+        self._manned = time.monotonic()
         self._slots = 1
 
     def slots(self) -> int:
-        """Some for each thread there is now; workers may come and go."""
-        if time.monotonic() - self._counted > _COUNT_AGAIN_S:
-            self._slots = max(1, AHEAD * sum(self._threads().values()))
-            self._counted = time.monotonic()
+        """Some for each thread there is now; workers may come and go.
+
+        Raises:
+            WorkersError: where there has been none for :data:`NO_WORKER_S`.
+        """
+        now = time.monotonic()
+        if now - self._counted > _COUNT_AGAIN_S:
+            threads = sum(self._threads().values())
+            if threads:
+                self._manned = now
+            elif now - self._manned > NO_WORKER_S:
+                raise WorkersError(
+                    f'the scheduler at {self._where} has had no workers for {NO_WORKER_S:g} s: '
+                    'what is done is kept, and the same command goes on once some are started with '
+                    f"'{_START.format(self._where)}'"
+                )
+            self._slots = max(1, AHEAD * threads)
+            self._counted = now
         return self._slots
 
     def submit(self, function: Callable[[T], R], item: T) -> Future[R]:
         """Hand out one job."""
+        ours: Future[R] = Future()
         try:
-            future: Future[R] = self._executor.submit(function, item)
+            theirs = self._client.submit(function, item, pure=False)
+            self._client.loop.add_callback(_settle, theirs, ours)
         except (OSError, RuntimeError) as error:
             raise WorkersError(f'{self.LOST} ({_first_line(error)})') from None
-        return future
+        return ours
 
     def died(self, error: BaseException) -> bool:
         """Whether the scheduler saw several workers die that had the job."""
@@ -184,6 +205,24 @@ class Cluster(Workers):
             {a: ', '.join(p.locked) for a, p in answers.items() if p.locked},
             'cannot write the output folder: give one that all machines share',
         )
+
+
+async def _settle(theirs: Any, ours: Future[Any]) -> None:
+    """Put what becomes of a future of Dask's into one of ours, whatever that is.
+
+    Dask's own executor waits for ever for a result that was there, was lost with its worker before
+    it was fetched, and then came to nothing; and for one that cannot be read here.
+    """
+    try:
+        result = await theirs.client.gather(theirs, asynchronous=True)
+    except BaseException as error:
+        if theirs.cancelled() or isinstance(error, asyncio.CancelledError):
+            ours.cancel()
+        if ours.set_running_or_notify_cancel():
+            ours.set_exception(error)
+    else:
+        if ours.set_running_or_notify_cancel():
+            ours.set_result(result)
 
 
 def _refuse(workers: Mapping[str, str], why: str) -> None:
