@@ -58,9 +58,16 @@ sys.exit(main())
 """
 
 
+@pytest.fixture(scope='module')
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp('walk') / 'walk.mcap'
+    assert main(['simulate', str(path), *SMALL, '--rate', '5']) == 0
+    return path
+
+
 @pytest.mark.parametrize('module', ['argparse', 'numpy', 'cv2', 'scipy.fft', 'mcap', 'rosbags'])
-def test_while_the_program_starts(module: str, tmp_path: Path) -> None:
-    assert main(['simulate', str(tmp_path / 'a.mcap'), *SMALL, '--rate', '5']) == 0
+def test_while_the_program_starts(module: str, walk: Path, tmp_path: Path) -> None:
+    shutil.copy(walk, tmp_path / 'a.mcap')
     words = ['track', 'a.mcap', '--output', 'a.csv', '--bag', 'out.mcap']
     done = subprocess.run(
         [sys.executable, '-c', STOP_AT_IMPORT, module, *words], cwd=tmp_path,
@@ -191,7 +198,7 @@ def test_evaluate_stopped_before_the_first_run_says_so(
 @pytest.mark.slow
 @pytest.mark.parametrize('presses', [1, 2])
 def test_evaluate_with_processes(presses: int, tmp_path: Path) -> None:
-    words = ['evaluate', 'sim:all:1-9', '--size', '160x90', '--variants', 'kcf', '--jobs', '2']
+    words = ['evaluate', 'sim:all:1-9', *SMALL, '--variants', 'kcf', '--jobs', '2']
     process = subprocess.Popen(
         [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', *words, '--report', 'report'],
         cwd=tmp_path, env=environment(), start_new_session=True, text=True,

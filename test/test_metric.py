@@ -259,9 +259,12 @@ def boxes_of(path: Path) -> list[Box | None]:
     return [Box(*row) if np.isfinite(row[0]) else None for row in rows]
 
 
-def frames_of(folder: Path, fps: float, camera: Intrinsics | None, depth: bool) -> list[Frame]:
+def frames_of(
+    folder: Path, fps: float, camera: Intrinsics | None, depth: bool, order: slice = slice(None)
+) -> list[Frame]:
+    """The images in the order that is asked for, at a camera's stamps."""
     frames = []
-    for i, path in enumerate(sorted((folder / 'rgb').iterdir())):
+    for i, path in enumerate(sorted((folder / 'rgb').iterdir())[order]):
         metres = None
         if depth:
             metres = cv2.imread(str(folder / 'depth' / f'{path.stem}.png'), -1).astype(np.float32)
@@ -371,10 +374,7 @@ def test_what_the_camera_turns_away_from_is_nothing_else(
 ):
     folder = shared_data / 'rgbd' / 'redkitchen'
     camera = Intrinsics(526.5, 526.5, 324, 238)
-    frames = [
-        dataclasses.replace(frame, stamp_ns=i * 33_333_333)
-        for i, frame in enumerate(frames_of(folder, 30.0, camera, depth=True)[order])
-    ]
+    frames = frames_of(folder, 30.0, camera, depth=True, order=order)
     tracker = create_tracker('metric')
     tracks = [tracker.start(frames[0], box)]
     tracks += [tracker.update(frame) for frame in frames[1:]]

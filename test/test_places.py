@@ -300,7 +300,7 @@ def test_a_report_says_how_many_places_lie_inside(
     report = tmp_path / 'report'
     assert main([
         'evaluate', 'sim:occlusion', '--seeds', '3', '--rate', '5', '--size', '320x180',
-        '--variants', 'metric,kcf', '--report', str(report),
+        '--variants', 'metric,kcf', '--jobs', '1', '--report', str(report),
     ]) == 0  # fmt: skip
     said = capsys.readouterr().out
     assert 'Places in metres' in said

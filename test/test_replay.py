@@ -24,10 +24,12 @@ from geometry_msgs.msg import PolygonStamped
 from rclpy.node import Node
 
 from rgbd_kcf_tracker import create_tracker
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
 from rgbd_kcf_tracker.recordings.images import decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.ros.messages import stamp_to_ns
+from rgbd_kcf_tracker.ros.replay_node import check_report
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
 pytestmark = [pytest.mark.ros, pytest.mark.timeout(240)]
@@ -268,12 +270,13 @@ def test_a_report_never_replaces_the_recording_and_nothing_else_unasked(
         (source, 'old.json', False, 'set overwrite to replace it'),
         (source, 'none/new.json', False, 'make it first'),
     ):
-        report = tmp_path / name
-        status, output = rig.run_replay(
-            tmp_path, bag=str(recording), report=str(report), overwrite=overwrite, rate=0.0
-        )
-        assert status == 2, output
-        assert words in output
+        with pytest.raises(RgbdKcfError, match=words):
+            check_report(str(tmp_path / name), str(recording), overwrite)
+    status, output = rig.run_replay(
+        tmp_path, bag=str(source), report=str(source), overwrite=True, rate=0.0
+    )
+    assert status == 2, output
+    assert 'is the source itself' in output
     assert source.read_bytes() == bag.read_bytes()
     for path in (tmp_path / 'seq' / 'groundtruth.txt', tmp_path / 'old.json'):
         assert path.read_text() == 'years of work'

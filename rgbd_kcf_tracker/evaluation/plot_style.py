@@ -70,5 +70,6 @@ def tidy(axes: Axes) -> None:
 def png(made: Figure, dpi: int = DPI) -> bytes:
     """The figure as a PNG file."""
     buffer = io.BytesIO()
-    made.savefig(buffer, format='png', dpi=dpi)
+    made.set_dpi(dpi)
+    FigureCanvasAgg(made).print_png(buffer)  # lays out and draws; savefig draws once more before
     return buffer.getvalue()
