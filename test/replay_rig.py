@@ -141,10 +141,10 @@ class Listener:
             time.sleep(0.02)
         time.sleep(0.3)  # discovery is one-sided
 
-    def await_boxes(self, count: int, timeout: float = 20.0) -> None:
-        """Until so many answers have come, or time is up."""
+    def await_each(self, count: int, *kept: list[Any], timeout: float = 20.0) -> None:
+        """Until so many of each have come, or time is up."""
         end = time.monotonic() + timeout
-        while len(self.boxes) < count and time.monotonic() < end:
+        while min(map(len, kept)) < count and time.monotonic() < end:
             time.sleep(0.02)
 
     def _spin(self) -> None:

@@ -187,6 +187,11 @@ class Rig:
         x, y, width, height = (round(v) for v in box.as_tuple())
         self.init.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
 
+    def await_request(self, tracker: TrackerNode) -> None:
+        """Until a tracker in this process has its first target, or waits for an image with it."""
+        session = tracker._session
+        self.wait(lambda: session._choice is not None or bool(session.asked_for), what='a request')
+
     # --- what came back ---
 
     def wait(self, condition: Callable[[], bool], timeout: float = 60.0, what: str = '') -> None:

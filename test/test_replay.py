@@ -88,7 +88,7 @@ def test_at_camera_rate_with_a_live_tracker(bag: Path, tmp_path: Path) -> None:
         heard.await_tracker()
         status, output = rig.run_replay(tmp_path, bag=str(bag), report=str(report))
         assert status == 0, output
-        heard.await_boxes(len(rig.frames()))
+        heard.await_each(len(rig.frames()), heard.boxes)
     figures = json.loads(report.read_text())
     count = len(rig.frames())
     assert figures['color_images'] == figures['depth_images'] == count
@@ -104,7 +104,7 @@ def test_pixels_and_stamps_arrive_as_recorded(bag: Path, tmp_path: Path) -> None
     with rig.Listener(images=True, clock=True) as heard:
         status, output = rig.run_replay(tmp_path, bag=str(bag), rate=3.0)
         assert status == 0, output
-        time.sleep(0.2)
+        heard.await_each(len(rig.frames()), heard.colors, heard.depths, heard.infos)
     wanted = rig.frames()
     assert len(heard.colors) == len(heard.depths) == len(heard.infos) == len(wanted)
     assert len(heard.clock) > len(wanted)
@@ -165,7 +165,7 @@ def test_remapping_moves_the_topics(bag: Path, tmp_path: Path) -> None:
              '-r', '/kinect2/qhd/image_depth_rect:=/depth/image'],
             check=True, timeout=60,
         )  # fmt: skip
-        time.sleep(0.2)
+        heard.await_each(5, heard.colors, heard.depths)
     assert len(heard.colors) == len(heard.depths) == 5
     assert heard.colors[0].header.frame_id == 'kinect2_rgb_optical_frame'
 
@@ -295,7 +295,7 @@ def test_bad_bags(bag: Path, tmp_path: Path) -> None:
     cut.write_bytes(whole[: len(whole) * 6 // 10])
     with rig.Listener(images=True) as heard:
         status, output = rig.run_replay(tmp_path, bag=str(cut), rate=0.0)
-        time.sleep(0.2)
+        heard.await_each(21, heard.colors)
     assert status == 0, output
     assert 'cut off' in output
     assert 20 < len(heard.colors) < len(rig.frames())
@@ -316,7 +316,7 @@ def test_compressed_chunks(tmp_path: Path, compression: str) -> None:
     path = rig.write_bag(tmp_path / 'packed.mcap', compression=compression)
     with rig.Listener(images=True) as heard:
         status, output = rig.run_replay(tmp_path, bag=str(path), rate=3.0)
-        time.sleep(0.2)
+        heard.await_each(len(rig.frames()), heard.colors)
     assert status == 0, output
     assert [bytes(m.data) for m in heard.colors] == [
         made.frame.color.tobytes() for made in rig.frames()

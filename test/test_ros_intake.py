@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -295,39 +296,49 @@ def test_timeline_rises_whatever_the_stamps_do(
     assert sum(m.restarted for m in moments) == restarts
 
 
+def until(condition: Callable[[], object]) -> None:
+    end = time.monotonic() + 30
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
 def test_worker_takes_the_newest_and_counts_the_others() -> None:
-    done, gate = [], threading.Event()
+    begun, done, gate = [], [], threading.Event()
 
     def work(item: int) -> None:
-        gate.wait(5)
+        begun.append(item)
+        gate.wait(30)
         done.append(item)
 
     worker = Worker(work, pytest.fail)
     worker.submit(0)
-    time.sleep(0.05)  # item 0 is in work
+    until(lambda: begun)
     dropped = sum(worker.submit(item) for item in range(1, 6))
     gate.set()
-    time.sleep(0.1)
+    until(lambda: done[-1:] == [5])
     assert worker.stop()
     assert done == [0, 5]
     assert dropped == 4
 
 
 def test_what_comes_at_once_does_not_displace_each_other() -> None:
+    begun: list[int] = []
     done: list[int] = []
     gate = threading.Event()
 
     def work(item: int) -> None:
-        gate.wait(5)
+        begun.append(item)
+        gate.wait(30)
         done.append(item)
 
     worker = Worker(work, pytest.fail)
     worker.submit(0)
-    time.sleep(0.1)  # item 0 is in work
+    until(lambda: begun)
     assert worker.submit(1) == 0
     assert worker.submit(2, 3, 4) == 1
     gate.set()
-    time.sleep(0.2)
+    until(lambda: done[-1:] == [4])
     assert worker.stop()
     assert done == [0, 2, 3, 4]
 
@@ -344,7 +355,7 @@ def test_worker_takes_all_in_order_and_outlives_errors() -> None:
     for item in range(20):
         assert worker.submit(item) == 0
     worker.call('mark', lambda: done.append('call'))
-    time.sleep(0.2)
+    until(lambda: 19 in done and 'call' in done)
     assert worker.stop()
     assert [d for d in done if d != 'call'] == [i for i in range(20) if i % 3]
     assert 'call' in done
@@ -361,24 +372,23 @@ def test_a_fast_worker_that_was_held_up_catches_up(work_s: float, kept: int) -> 
         begun.append(item)
         time.sleep(work_s)
         if item == 100:
-            gate.wait(5)
+            gate.wait(30)
         done.append(item)
 
     worker = Worker(work, pytest.fail, catch_up=3)
     for item in range(20):
         worker.submit(item)
         time.sleep(0.02)
-    time.sleep(0.1)  # nothing waits
+    until(lambda: done[-1:] == [19])
     worker.submit(100)
-    time.sleep(0.1)  # it is in work
-    assert begun[-1] == 100
+    until(lambda: begun[-1] == 100)
     dropped = 0
     for item in range(101, 107):
         dropped += worker.submit(item)
         time.sleep(0.02)
     assert dropped == 6 - kept
     gate.set()
-    time.sleep(0.3)
+    until(lambda: done[-1] == 106)
     assert worker.stop()
     assert done[-kept - 1 :] == [100, *range(107 - kept, 107)]
 
@@ -395,7 +405,7 @@ def test_nothing_is_dropped_while_the_first_item_takes_longest() -> None:
     for item in range(8):
         dropped += worker.submit(item)
         time.sleep(0.04)
-    time.sleep(0.1)
+    until(lambda: done[-1:] == [7])
     assert worker.stop()
     assert dropped == 0
     assert done == list(range(8))
@@ -411,16 +421,18 @@ def test_worker_ends_while_at_work() -> None:
 
 
 def test_a_worker_that_stops_does_what_was_asked_before() -> None:
+    begun: list[int] = []
     done: list[object] = []
     gate = threading.Event()
 
     def work(item: int) -> None:
-        gate.wait(5)
+        begun.append(item)
+        gate.wait(30)
         done.append(item)
 
     worker = Worker(work, pytest.fail, keep=100)
     worker.submit(0, 1, 2)
-    time.sleep(0.05)  # item 0 is in work
+    until(lambda: begun)
     worker.call('reset', lambda: done.append('reset'))
     assert not worker.stop(0.05)
     assert not worker.ended
@@ -433,29 +445,33 @@ def test_a_worker_that_stops_does_what_was_asked_before() -> None:
 
 
 def test_of_calls_of_one_kind_the_last_counts_and_items_go_on() -> None:
+    begun: list[str] = []
     done: list[str] = []
-    gate = threading.Event()
+    gate, enough = threading.Event(), threading.Event()
 
     def work(item: str) -> None:
-        gate.wait(5)
+        begun.append(item)
+        gate.wait(30)
         done.append(item)
 
     worker = Worker(work, pytest.fail, keep=100)
     worker.submit('first')
-    time.sleep(0.05)
+    until(lambda: begun)
     for number in range(100):
         worker.call('choice', lambda number=number: done.append(f'choice {number}'))
         worker.call('reset', lambda number=number: done.append(f'reset {number}'))
     worker.call('choice', lambda: done.append('choice'))
 
     def again() -> None:
-        worker.call('endless', again)
+        if not enough.is_set():
+            worker.call('endless', again)
 
     worker.call('endless', again)  # asks for itself for ever: items still have their turn
     worker.submit('second')
     gate.set()
-    time.sleep(0.1)
-    worker._calls.clear()
+    until(lambda: 'second' in done)
+    enough.set()
+    assert worker.stop()
     assert done == ['first', 'reset 99', 'choice', 'second']
 
 

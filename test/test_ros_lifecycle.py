@@ -152,14 +152,16 @@ def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
 def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    gate = threading.Event()
+    in_work, gate = threading.Event(), threading.Event()
     monkeypatch.setattr(Worker.stop, '__defaults__', (0.2,))
     with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
         rig.play(range(3))
         session, update = node._session, node._session._targets.update
-        node._session._targets.update = lambda frame: gate.wait(30) and update(frame)
+        node._session._targets.update = lambda frame: (
+            in_work.set() or (gate.wait(30) and update(frame))
+        )
         rig.send(3)
-        time.sleep(0.2)
+        assert in_work.wait(30)
         assert change(rig, Transition.TRANSITION_DEACTIVATE)
         assert set_parameter(rig, 'variant', 'kcf').successful
         # Its image is still in work, with the session that a new worker would use.
@@ -178,13 +180,14 @@ def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(
 
 
 def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
+    in_work = threading.Event()
     with running_node(rig, queue_policy='all', init_box=box_text(0)) as node:
         rig.play(range(2))
         targets = node._session._targets
         update = targets.update
-        targets.update = lambda frame: time.sleep(0.3) or update(frame)
+        targets.update = lambda frame: in_work.set() or time.sleep(0.3) or update(frame)
         rig.send(2)
-        time.sleep(0.1)  # in work
+        assert in_work.wait(30)
         assert set_parameter(rig, 'variant', 'kcf').successful
         client = rig.node.create_client(Trigger, '/tracker/reset')
         assert client.wait_for_service(20)

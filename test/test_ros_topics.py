@@ -29,11 +29,11 @@ pytestmark = pytest.mark.ros
 
 
 def test_a_click_chooses_the_surface(rig: Rig) -> None:
-    with running_node(rig, queue_policy='all'):
+    with running_node(rig, queue_policy='all') as node:
         rig.play([0])
         truth = scene(0)[2]
         rig.init_point.publish(PointStamped(point=Point(x=truth.cx, y=truth.cy)))
-        time.sleep(0.3)
+        rig.await_request(node)
         rig.play(range(1, 5))
         assert rig.box().iou(scene(4)[2]) > 0.6
         rig.init_point.publish(PointStamped(point=Point(x=5.0, y=230.0)))

@@ -111,11 +111,11 @@ def test_process_ends_cleanly_within_a_second(rig: Rig, number: signal.Signals) 
 
 
 def test_init_reset_and_init_again(rig: Rig) -> None:
-    with running_node(rig, queue_policy='all'):
+    with running_node(rig, queue_policy='all') as node:
         rig.play(range(3))
         assert [rig.box(i) for i in range(3)] == [None] * 3
         rig.send_init(scene(2)[2])
-        time.sleep(0.2)
+        rig.await_request(node)
         rig.play(range(3, 12))
         assert rig.box().iou(scene(11)[2]) > 0.6
         client = rig.node.create_client(Trigger, '/tracker/reset')
@@ -126,15 +126,15 @@ def test_init_reset_and_init_again(rig: Rig) -> None:
         rig.play(range(12, 14))
         assert rig.box() is None
         rig.send_init(scene(13)[2])
-        time.sleep(0.2)
+        rig.await_request(node)
         rig.play(range(14, 20))
         assert rig.box().iou(scene(19)[2]) > 0.6
 
 
 def test_init_before_the_first_image_waits_for_it(rig: Rig) -> None:
-    with running_node(rig, queue_policy='all'):
+    with running_node(rig, queue_policy='all') as node:
         rig.send_init(scene(0)[2])
-        time.sleep(0.2)
+        rig.await_request(node)
         rig.play(range(5))
         assert corners(rig.box(0)) == corners(scene(0)[2])
         assert rig.box().iou(scene(4)[2]) > 0.6
@@ -144,7 +144,7 @@ def test_init_outside_the_image_keeps_the_target(rig: Rig) -> None:
     with running_node(rig, init_box=box_text(scene(0)[2]), queue_policy='all'):
         rig.play(range(3))
         rig.send_init(Box(WIDTH + 50, HEIGHT + 50, 20, 20))
-        time.sleep(0.2)
+        rig.wait(lambda: rig.values().get('last_error', ''), what='a refusal')
         rig.play(range(3, 6))
         assert rig.box().iou(scene(5)[2]) > 0.6
         values = rig.fresh_values()
