@@ -111,7 +111,7 @@ def test_a_request_that_does_not_fit_the_state_is_refused_and_survived(rig: Rig)
         assert state(rig) == State.PRIMARY_STATE_ACTIVE
 
 
-def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
+def test_hundreds_of_lifecycle_cycles(ros_domain: int) -> None:
     """Memory, threads and topics are what they were, and it still works."""
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=ros_domain)
@@ -140,11 +140,11 @@ def test_a_thousand_lifecycle_cycles(ros_domain: int) -> None:
         cycle()
     gc.collect()
     before, memory = counted(), resident_mb(os.getpid())
-    for _ in range(900):
+    for _ in range(200):
         cycle()
     gc.collect()
     assert counted() == before
-    assert resident_mb(os.getpid()) - memory < 20
+    assert resident_mb(os.getpid()) - memory < 5
     node.destroy_node()
     rclpy.shutdown(context=context)
 
