@@ -71,7 +71,7 @@ def ceiling(rng: np.random.Generator, h: int, w: int) -> Texture:
 def floor(rng: np.random.Generator, h: int, w: int) -> Texture:
     """A floor: planks, tiles or carpet."""
     kind = rng.choice(['planks', 'tiles', 'carpet', 'concrete'])
-    rows, cols = np.mgrid[0:h, 0:w].astype(np.float32)
+    rows, cols = np.arange(h, dtype=np.float32)[:, None], np.arange(w, dtype=np.float32)[None]
     if kind == 'planks':
         color = (rng.uniform(40, 110), rng.uniform(80, 140), rng.uniform(120, 190))
         count = rng.integers(20, 40)
@@ -82,7 +82,7 @@ def floor(rng: np.random.Generator, h: int, w: int) -> Texture:
         image = filled(h, w, color) * tint[row.astype(int) % 64, col.astype(int) % 64][..., None]
         grain = cv2.resize(rng.standard_normal((h, max(1, w // 24)), dtype=np.float32), (w, h))
         image *= 1 + 0.07 * grain[..., None]
-        image[rows % ph < 1.5] *= 0.6
+        image[rows[:, 0] % ph < 1.5] *= 0.6
     elif kind == 'tiles':
         color = random_color(rng, (0.02, 0.3), (0.45, 0.85))
         image = filled(h, w, color)

@@ -59,8 +59,8 @@ def filled(h: int, w: int, color: Color) -> npt.NDArray[np.float32]:
 
 
 def finished(image: npt.NDArray[np.float32]) -> Texture:
-    """Back from ``(h, w, 3)`` float32 BGR to uint8, cut off at 0 and 255."""
-    return np.clip(image, 0, 255).astype(np.uint8)
+    """Back from ``(h, w, 3)`` float32 BGR to uint8, cut off at 0 and 255; ``image`` is used up."""
+    return np.clip(image, 0, 255, out=image).astype(np.uint8)
 
 
 def shaded(
@@ -70,14 +70,15 @@ def shaded(
 
     Args:
         rng: source of them.
-        image: ``(h, w, 3)`` float32 BGR from 0 to 255.
+        image: ``(h, w, 3)`` float32 BGR from 0 to 255; used up.
         broad: share by which folds are about lighter or darker.
         grain: deviation of each pixel's, as a share.
     """
     h, w = image.shape[:2]
     gain = 1 + broad * smooth_noise(rng, h, w, 6) + broad * 0.6 * smooth_noise(rng, h, w, 17)
     gain += grain * rng.standard_normal((h, w), dtype=np.float32)
-    return finished(image * gain[..., None])
+    image *= gain[..., None]
+    return finished(image)
 
 
 def cloth(
