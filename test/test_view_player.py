@@ -11,6 +11,7 @@ import struct
 import time
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,7 @@ def test_candidates_particles_and_ellipse_are_those_of_the_tracker() -> None:
 def test_cues_add_up_to_the_verdict_also_beside_others() -> None:
     """What the likeliest loses to candidates elsewhere was in the score and not among the cues."""
     lost = 0
-    for seed in (3, 1, 5):
+    for seed in (3, 5, 1):
         if lost:
             break
         scene = SimulatedRecording('crowd', seed, 10.0, (480, 270), 10.0)
@@ -156,7 +157,7 @@ def test_cues_add_up_to_the_verdict_also_beside_others() -> None:
         tracker = create_tracker('metric')
         frames = scene.frames(start)
         tracker.start(next(frames), box)
-        for frame in frames:
+        for frame in islice(frames, 50):
             track = tracker.update(frame)
             considered = insight_of(tracker).considered
             for one in considered:

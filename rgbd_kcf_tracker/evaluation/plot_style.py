@@ -71,5 +71,6 @@ def png(made: Figure, dpi: int = DPI) -> bytes:
     """The figure as a PNG file."""
     buffer = io.BytesIO()
     made.set_dpi(dpi)
-    FigureCanvasAgg(made).print_png(buffer)  # lays out and draws; savefig draws once more before
+    # Lays out and draws; savefig draws once more before.
+    FigureCanvasAgg(made).print_png(buffer)  # type: ignore[no-untyped-call]
     return buffer.getvalue()
