@@ -473,7 +473,7 @@ def test_command_exports_and_refuses_to_replace(
     assert '4 moments' in capsys.readouterr().out
     assert main(command) == 2
     assert '--overwrite' in capsys.readouterr().err
-    assert main(['view', '--seed', '3', '--host', '0.0.0.0']) == 2
+    assert main(['view', str(tmp_path / 'none.mcap'), '--host', '0.0.0.0']) == 2, 'at once'
     assert 'ssh -L' in capsys.readouterr().err
 
 

@@ -85,6 +85,12 @@ def run(args: argparse.Namespace) -> int:
     _check_export(args)
     variant = args.variant or DEFAULT_VARIANT
     parameters = tracker_parameters(args, variant)
+    host = '127.0.0.1' if args.host is None else args.host
+    token = _token(args)
+    if args.export is None:
+        from rgbd_kcf_tracker.view.server import check_access
+
+        check_access(host, token)  # before a long recording is opened
     with open_source(args) as recording:
         warnings = Warnings(recording.warnings)
         warnings.show()
@@ -94,9 +100,8 @@ def run(args: argparse.Namespace) -> int:
         from rgbd_kcf_tracker.view.player import Player
 
         player = Player(recording, variant, parameters, start=start, box=box, everyone=args.all)
-        host = '127.0.0.1' if args.host is None else args.host
         port = 8080 if args.port is None else args.port
-        serve(player, host, port, _token(args), args.open)
+        serve(player, host, port, token, args.open)
     return 0
 
 

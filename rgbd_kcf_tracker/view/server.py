@@ -71,6 +71,21 @@ def static_file(name: str) -> bytes:
     return resources.files('rgbd_kcf_tracker.view').joinpath('static').joinpath(name).read_bytes()
 
 
+def check_access(host: str, token: str) -> None:
+    """Refuse what would let strangers in.
+
+    Raises:
+        ParameterError: for an address that is no loopback one without a token, or a short token.
+    """
+    if not token and not is_loopback(host):
+        raise ParameterError(
+            f'{host} is reachable from other machines: give a token (--token), or listen on '
+            '127.0.0.1 and reach it through an SSH tunnel (ssh -L 8080:127.0.0.1:8080 HOST)'
+        )
+    if token and len(token) < SHORTEST_TOKEN:
+        raise ParameterError(f'the token is too short: give at least {SHORTEST_TOKEN} signs')
+
+
 class Server:
     """Serves the page of a controller, in a thread of its own.
 
@@ -90,13 +105,7 @@ class Server:
     def __init__(
         self, controller: Controller, host: str = '127.0.0.1', port: int = 8080, token: str = ''
     ) -> None:
-        if not token and not is_loopback(host):
-            raise ParameterError(
-                f'{host} is reachable from other machines: give a token (--token), or listen on '
-                '127.0.0.1 and reach it through an SSH tunnel (ssh -L 8080:127.0.0.1:8080 HOST)'
-            )
-        if token and len(token) < SHORTEST_TOKEN:
-            raise ParameterError(f'the token is too short: give at least {SHORTEST_TOKEN} signs')
+        check_access(host, token)
         self._controller, self._board = controller, controller.board
         self._host, self._port, self._token = host, port, token
         # What is kept in the browser is not the token itself, and ends with this server.
