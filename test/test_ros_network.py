@@ -230,11 +230,16 @@ def test_links_that_go_down_come_back(network: Network) -> None:
     count = 150
 
     def disturb() -> None:
+        # Not before images go: on a busy machine the camera starts after seconds.
+        before, end = network.sent_bytes('camera'), time.monotonic() + 60
+        while network.sent_bytes('camera') < before + 1_000_000:
+            assert time.monotonic() < end, 'the camera sends nothing'
+            time.sleep(0.05)
         for host in ('camera', 'consumer'):
-            time.sleep(3)
             network.plug(host, False)
             time.sleep(2)
             network.plug(host, True)
+            time.sleep(3)
 
     figures = run_disturbed(network, count, disturb)
     assert figures['longest_gap_s'] > 1.5
