@@ -177,8 +177,14 @@ def test_names_that_are_not_utf_8_work_and_are_told(
 # -- ground truth ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('line', ['1,nan,3,4', 'inf,2,3,4', '1,2,3,-inf', 'nan,nan,nan,4'])
-def test_half_a_box_is_an_error_that_names_the_line(
+@pytest.mark.parametrize(
+    'line',
+    [
+        '1,nan,3,4', 'inf,2,3,4', '1,2,3,-inf', 'nan,nan,nan,4',
+        '1,2,-3,4', '1,2,3,-4', '1,2,3,4,5', '1,2,3,4,5,6,7', '1,2,nan,4,5,6,7,8',
+    ],
+)  # fmt: skip
+def test_what_is_no_box_is_an_error_that_names_the_line(
     line: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = write_folder(tmp_path / 'seq')

@@ -202,6 +202,11 @@ def test_ground_truth_in_any_common_form(tmp_path: Path) -> None:
     assert read_boxes(tmp_path / 'a.txt') == [box, box, box, box, None, None, None]
 
 
+def test_a_polygon_is_its_upright_box(tmp_path: Path) -> None:
+    (tmp_path / 'a.txt').write_text('5,0,10,5,5,10,0,5\n1,2,9,2,5,8\n' + ','.join(['nan'] * 8))
+    assert read_boxes(tmp_path / 'a.txt') == [Box(0, 0, 10, 10), Box(1, 2, 8, 6), None]
+
+
 def test_ground_truth_of_another_length(tmp_path: Path) -> None:
     folder(tmp_path)
     (tmp_path / 'groundtruth.txt').write_text('1,2,3,4\n')

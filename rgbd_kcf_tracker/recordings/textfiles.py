@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -31,11 +32,16 @@ def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     )
 
 
-def read_boxes(path: Path) -> list[Box | None]:
-    """Boxes of a ground-truth file, one ``x,y,width,height`` per line.
+def read_boxes(path: Path, flags: int = 0) -> list[Box | None]:
+    """Boxes of a ground-truth file, one ``x,y,width,height`` or polygon per line.
 
     Numbers may be parted by commas, semicolons, tabs or blanks. A line of four ``nan``, or a box
-    without size, is None: the target is absent.
+    without size, is None: the target is absent. A polygon ``x1,y1,x2,y2,x3,y3,...`` is its upright
+    bounding box.
+
+    Args:
+        path: the file.
+        flags: how many numbers may follow a box that say something else of it.
 
     Raises:
         RecordingError: naming the line that is none of this.
@@ -44,9 +50,8 @@ def read_boxes(path: Path) -> list[Box | None]:
     for number, line in enumerate(read_lines(path), start=1):
         fields = re.split(r'[,;\s]+', line.strip().strip(',;'))
         try:
-            if len(fields) < 4:
-                raise ValueError
-            boxes.append(box_or_none(*(float(field) for field in fields[:4])))
+            values = [float(field) for field in fields]
+            boxes.append(box_of_region(values[:4] if len(values) <= 4 + flags else values))
         except ValueError:
             raise RecordingError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no box: '
@@ -55,18 +60,37 @@ def read_boxes(path: Path) -> list[Box | None]:
     return boxes
 
 
+def box_of_region(values: Sequence[float]) -> Box | None:
+    """The upright bounding box of ``x, y, width, height`` or of a polygon's corners.
+
+    Raises:
+        ValueError: where it is neither, or half of it; see :func:`box_or_none`.
+    """
+    if len(values) == 4:
+        return box_or_none(*values)
+    if len(values) < 6 or len(values) % 2:
+        raise ValueError(f'{len(values)} numbers')
+    if all(map(math.isnan, values)):
+        return None
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f'{values}')
+    xs, ys = values[0::2], values[1::2]
+    return box_or_none(min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys))
+
+
 def box_or_none(x: float, y: float, width: float, height: float) -> Box | None:
     """The box, or None where the target is absent: four NaN, or no size.
 
     Raises:
-        ValueError: where some numbers are finite and some are not: a mistake, and no absence.
+        ValueError: where some numbers are finite and some are not, or the size is negative: a
+            mistake, and no absence.
     """
     values = (x, y, width, height)
     if all(map(math.isnan, values)):
         return None
-    if not all(map(math.isfinite, values)):
+    if not all(map(math.isfinite, values)) or width < 0 or height < 0:
         raise ValueError(f'{x},{y},{width},{height}')
-    return None if width <= 0 or height <= 0 else Box(*values)
+    return None if width == 0 or height == 0 else Box(*values)
 
 
 def known(boxes: list[Box | None] | None) -> list[Box | None] | None:

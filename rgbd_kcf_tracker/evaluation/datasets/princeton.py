@@ -32,6 +32,8 @@ MAT_FILES = ('framesNEW.mat', 'frames.mat')
 
 CATEGORIES_FILE = 'categories.csv'
 _PARTS = ('init.txt', 'rgb', 'depth')
+_FLAGS = 1
+"""Numbers after a box: whether the target is occluded, which the box says, too."""
 
 
 def is_sequence(path: Path) -> bool:
@@ -93,11 +95,11 @@ def load(path: Path) -> Opened:
     count = len(frames.colors)
     truth_path, init_path = path / f'{path.name}.txt', path / 'init.txt'
     if truth_path.is_file():
-        boxes = read_boxes(truth_path)
+        boxes = read_boxes(truth_path, _FLAGS)
         check_lengths(truth_path, len(boxes), frames.colors, folders)
         annotated = True
     elif init_path.is_file():
-        first = read_boxes(init_path)
+        first = read_boxes(init_path, _FLAGS)
         boxes = [*first[:1], *[None] * (count - 1)]
         annotated = False
     else:

@@ -10,7 +10,6 @@ masks ``mX,Y,WIDTH,HEIGHT,run,run,...``; ``nan`` or ``0`` where the target is ab
 
 from __future__ import annotations
 
-import math
 import re
 from functools import partial
 from pathlib import Path
@@ -25,7 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 )
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, even_stamps, image_files
-from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
+from rgbd_kcf_tracker.recordings.textfiles import box_of_region, read_lines
 
 
 def is_sequence(path: Path) -> bool:
@@ -114,14 +113,7 @@ def parse_region(text: str) -> Box | None:
     values = [float(v) for v in re.split(r'[,;\s]+', text)]
     if len(values) == 1:
         return None  # a code: 0 unknown, 1 start, 2 failure
-    if len(values) == 4:
-        return box_or_none(*values)
-    if len(values) < 6 or len(values) % 2:
-        raise ValueError(text)
-    if not all(map(math.isfinite, values)):
-        return None
-    xs, ys = values[0::2], values[1::2]
-    return box_or_none(min(xs), min(ys), max(xs) - min(xs), max(ys) - min(ys))
+    return box_of_region(values)
 
 
 def _mask_bounds(values: list[int]) -> Box | None:
