@@ -174,6 +174,35 @@ def test_names_that_are_not_utf_8_work_and_are_told(
     assert b'th\\udce9.none does not exist' in said.stderr
 
 
+def test_names_of_sequences_do_not_hang_on_the_locale() -> None:
+    code = """
+import dataclasses, pathlib
+from rgbd_kcf_tracker.evaluation.datasets.base import broken
+print(ascii(dataclasses.replace(broken(pathlib.Path('a/th\\udcc3\\udca9'), '')).name))
+"""
+    plain = {'LC_ALL': 'C', 'PYTHONUTF8': '0', 'PYTHONCOERCECLOCALE': '0'}
+    said = subprocess.run(
+        [sys.executable, '-c', code],
+        capture_output=True,
+        env=os.environ | plain | {'PYTHONPATH': os.pathsep.join(sys.path)},
+        check=True,
+    )
+    assert said.stdout == b"'th\\xe9'\n"
+
+
+@pytest.mark.parametrize('kind', ['folder', 'MCAP', 'SQLITE3'])
+def test_what_macos_leaves_beside_files_is_not_read(kind: str, tmp_path: Path) -> None:
+    source = tmp_path / 'walk'
+    if kind == 'folder':
+        write_folder(source)
+    else:
+        write_rosbag2(source, camera_messages(FRAMES), kind)
+    for path in [p for p in source.rglob('*') if p.is_file()]:
+        path.with_name(f'._{path.name}').write_bytes(b'\0\5\x16\7\0\2\0\0Mac OS X        ')
+    with open_recording(source) as recording:
+        assert len(list(recording.frames())) == len(FRAMES)
+
+
 # -- ground truth ------------------------------------------------------------------------------
 
 

@@ -99,6 +99,20 @@ def read_text(path: Path) -> str:
         raise RecordingError(f'{path} is not a text file') from None
 
 
+def listing(folder: Path) -> list[Path]:
+    """What is in a folder, in no order, without hidden files.
+
+    Where macOS copies to a foreign disk, it puts a hidden ``._NAME`` beside every file.
+
+    Raises:
+        RecordingError: where it cannot be read.
+    """
+    try:
+        return [path for path in folder.iterdir() if not path.name.startswith('.')]
+    except OSError as error:
+        raise RecordingError(cannot_read(folder, error)) from None
+
+
 def kind_of(mode: int) -> str:
     """What a file that is no regular one is, in words."""
     return next((words for test, words in _KINDS if test(mode)), 'no file')

@@ -13,7 +13,7 @@ from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
-from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, cannot_read, read_file
+from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, listing, read_file
 from rgbd_kcf_tracker.recordings.images import (
     DepthImage,
     EncodingError,
@@ -26,15 +26,12 @@ IMAGE_SUFFIXES = frozenset({'.png', '.jpg', '.jpeg', '.tif', '.tiff'})
 
 
 def image_files(folder: Path) -> tuple[Path, ...]:
-    """The images in a folder in the order of their numbers.
+    """The images in a folder in the order of their numbers, without hidden files.
 
     Raises:
         RecordingError: where the folder cannot be read or holds no image.
     """
-    try:
-        found = [p for p in folder.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
-    except OSError as error:
-        raise RecordingError(cannot_read(folder, error)) from None
+    found = [p for p in listing(folder) if p.suffix.lower() in IMAGE_SUFFIXES]
     if not found:
         raise RecordingError(f'{folder} holds no images (PNG, JPEG or TIFF)')
     return tuple(sorted(found, key=lambda p: natural_key(p.name)))

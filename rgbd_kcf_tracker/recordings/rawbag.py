@@ -15,7 +15,7 @@ import yaml
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import unpack, unpack_file
-from rgbd_kcf_tracker.recordings.files import cannot_read, open_file, read_text
+from rgbd_kcf_tracker.recordings.files import listing, open_file, read_text
 from rgbd_kcf_tracker.recordings.mcap_storage import McapStorage
 from rgbd_kcf_tracker.recordings.ros1_storage import Ros1Storage
 from rgbd_kcf_tracker.recordings.sqlite_storage import SqliteStorage
@@ -142,10 +142,7 @@ class RawBag:
             mode = str(metadata.get('compression_mode') or '').lower()
             if mode == 'message':
                 self._message_method = str(metadata.get('compression_format') or 'zstd')
-        try:
-            inside = sorted(self.path.iterdir(), key=lambda p: natural_key(p.name))
-        except OSError as error:
-            raise RecordingError(cannot_read(self.path, error)) from None
+        inside = sorted(listing(self.path), key=lambda p: natural_key(p.name))
         present = {p.name: p for p in inside if p.name.removesuffix('.zstd').endswith(_SUFFIXES)}
         missing = [name for name in names if name not in present]
         if missing:

@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rgbd_kcf_tracker.errors import DatasetError, ParameterError
+from rgbd_kcf_tracker.errors import DatasetError, ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.files import listing
 
 CLEAR_FRACTION = 0.5
 """A target is clearly in view where at least this share of it shows."""
@@ -135,7 +135,8 @@ class Sequence:
     def __post_init__(self) -> None:
         # Names of files need not be UTF-8, those in tables do.
         for field_name in ('name', 'scenario'):
-            text = os.fsencode(getattr(self, field_name)).decode('utf-8', 'backslashreplace')
+            text = getattr(self, field_name).encode('utf-8', 'surrogateescape')
+            text = text.decode('utf-8', 'backslashreplace')
             object.__setattr__(self, field_name, text)
 
 
@@ -204,9 +205,9 @@ def entries(path: Path) -> list[Path]:
         UnreadableError: where it cannot be read.
     """
     try:
-        return [p for p in path.iterdir() if not p.name.startswith('.')]
-    except OSError as error:
-        raise UnreadableError(f'{path} cannot be read: {error.strerror or error}') from None
+        return listing(path)
+    except RecordingError as error:
+        raise UnreadableError(str(error)) from None
 
 
 def group(path: Path) -> str:
