@@ -399,13 +399,20 @@ def test_info_checks_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert '000006.png' in text
 
 
+ENVIRONMENT = os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}
+
+
+def program(*arguments: object) -> list[str]:
+    return [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', *map(str, arguments)]
+
+
 def run_program(*arguments: object, **options: Any) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, '-m', 'rgbd_kcf_tracker.cli.main', *map(str, arguments)],
+        program(*arguments),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+        env=ENVIRONMENT,
         **options,
     )
 
@@ -485,6 +492,51 @@ def test_closed_pipe_is_no_traceback(folder: Path) -> None:
     process.wait()
     assert process.returncode != 0
     assert 'Traceback' not in err
+
+
+@pytest.mark.parametrize('closed', ['<&-', '>&-', '2>&-', '<&- >&- 2>&-'])
+def test_a_standard_stream_that_is_closed_is_no_output_file(
+    closed: str, folder: Path, tmp_path: Path
+) -> None:
+    # A file that is opened takes the number of a closed stream, and whatever is printed with it.
+    table, bag = tmp_path / 'boxes.csv', tmp_path / 'boxes.mcap'
+    words = ['track', str(folder), '--variant', 'kcf', '--output', str(table), '--bag', str(bag)]
+    run = ['sh', '-c', f'exec "$@" {closed}', 'sh', *program(*words)]
+    ended = subprocess.run(run, env=ENVIRONMENT, capture_output=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, b'')
+    assert len(table.read_text().splitlines()) == 13
+    assert main(['info', str(bag), '--check']) == 0
+
+
+def test_what_standard_output_cannot_take_is_told(folder: Path, tmp_path: Path) -> None:
+    there = tmp_path / 'no ASCII: \u00fc'
+    there.symlink_to(folder)
+    with open('/dev/full', 'wb') as full:
+        ended = subprocess.run(
+            program('info', str(there)), env=ENVIRONMENT, stdout=full,
+            stderr=subprocess.PIPE, check=False,
+        )  # fmt: skip
+    assert ended.returncode == 2
+    assert ended.stderr.startswith(b'rgbd-kcf: error: standard output, ')
+    ended = subprocess.run(
+        program('info', str(there)),
+        env=ENVIRONMENT | {'PYTHONIOENCODING': 'ascii'},
+        capture_output=True,
+        check=True,
+    )
+    assert ended.stdout.startswith(str(there).encode('ascii', 'backslashreplace'))
+
+
+def test_a_working_folder_that_is_gone_is_told(folder: Path, tmp_path: Path) -> None:
+    gone = tmp_path / 'gone'
+    gone.mkdir()
+    run = ['sh', '-c', 'cd "$0" && rmdir "$0" && exec "$@"', str(gone)]
+    ended = subprocess.run(
+        [*run, *program('track', folder, '--output', 'boxes.csv')],
+        env=ENVIRONMENT, capture_output=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 2
+    assert b'started in is gone' in ended.stderr
 
 
 # -- real recordings ---------------------------------------------------------------------------

@@ -48,6 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Errors that a user can mend are one message on standard error and exit code 2, Ctrl-C is 130.
     """
     try:
+        _open_closed_streams()
         return _run(list(sys.argv[1:] if argv is None else argv))
     except KeyboardInterrupt:
         print(f'{PROGRAM}: interrupted', file=sys.stderr)
@@ -84,18 +85,49 @@ def _run(arguments: list[str]) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except OSError as error:
-        name = f'{error.filename}: ' if error.filename else ''
+        name = f'{error.filename}: ' if error.filename else _unnamed(error.errno)
         print(f'{PROGRAM}: error: {name}{error.strerror or error}', file=sys.stderr)
         return EXIT_USAGE
 
 
+def _open_closed_streams() -> None:
+    """Standard streams that were closed lead nowhere: the next file would be one of them."""
+    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+        if getattr(sys, name) is not None:
+            continue
+        try:
+            os.fstat(number)
+        except OSError:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            if nowhere != number:
+                os.dup2(nowhere, number)
+                os.close(nowhere)
+        stream = open(os.devnull, 'w' if number else 'r', encoding='utf-8')  # noqa: SIM115
+        setattr(sys, name, stream)
+
+
+def _unnamed(number: int | None) -> str:
+    """What an error is about that names no file; ours do."""
+    import errno
+
+    if number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+        return 'standard output, or a temporary file, cannot be written: '
+    try:
+        os.getcwd()
+    except OSError:
+        return 'the folder that this was started in is gone, change to another: '
+    return ''
+
+
 def _prepare_messages() -> None:
-    """Names that are no UTF-8 are printed as they are, and warnings as ours."""
+    """Whatever a name holds can be printed, in any encoding; warnings look as ours."""
+    import codecs
     import io
     import logging
 
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors='surrogateescape')
+        utf_8 = codecs.lookup(sys.stdout.encoding).name == 'utf-8'
+        sys.stdout.reconfigure(errors='surrogateescape' if utf_8 else 'backslashreplace')
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(logging.Formatter('warning: %(message)s'))
 
