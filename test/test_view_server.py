@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import socket
 import struct
 import threading
 import time
@@ -21,6 +22,7 @@ pytest.importorskip('aiohttp', reason="the page needs aiohttp: pip install '.[vi
 import aiohttp
 
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.view import server as module
 from rgbd_kcf_tracker.view.board import Board
 from rgbd_kcf_tracker.view.commands import Command, parse
 from rgbd_kcf_tracker.view.server import COOKIE, Server, is_loopback
@@ -300,6 +302,60 @@ def test_a_login_too_large_is_refused(server: Server) -> None:
             assert answer.status == 413
 
     run(ask)
+
+
+def answer_to(server: Server, request: bytes) -> bytes:
+    """The first line of what comes back, or b'' where the connection is closed."""
+    host, _, port = server.url.split('/')[2].rpartition(':')
+    with socket.create_connection((host, int(port)), timeout=20) as connection:
+        connection.sendall(request.replace(b'HERE', f'{host}:{port}'.encode()))
+        with connection.makefile('rb') as lines:
+            return lines.readline()
+
+
+FORM = b'POST /login HTTP/1.1\r\nHost: HERE\r\nOrigin: http://HERE\r\n'
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+@pytest.mark.parametrize(
+    'request_',
+    [
+        b'GET / HTTP/1.1\r\nHost: [::1\r\n\r\n',
+        b'GET / HTTP/1.1\r\nHost: HERE\r\nOrigin: http://[::1\r\n\r\n',
+        b'GET /boxes.csv HTTP/1.1\r\nHost: HERE\r\nOrigin: http://HERE/\r\n'
+        b'Cookie: rgbd_kcf_view=\xff\xfe\r\n\r\n',
+        FORM + b'Content-Type: multipart/form-data\r\nContent-Length: 5\r\n\r\nhello',
+        FORM + b'Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 5\r\n\r\nhello',
+        FORM + b'Content-Type: application/x-www-form-urlencoded; charset=none\r\n'
+        b'Content-Length: 7\r\n\r\ntoken=x',
+        FORM + b'Content-Type: application/x-www-form-urlencoded\r\nContent-Encoding: gzip\r\n'
+        b'Content-Length: 7\r\n\r\ntoken=x',
+    ],
+)
+def test_a_request_that_is_garbage_is_no_error_of_ours(server: Server, request_: bytes) -> None:
+    assert answer_to(server, request_).split()[1].startswith(b'4')
+
+
+def test_a_form_that_never_ends_holds_no_connection(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, 'FORM_S', 0.1)
+    kind = b'Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 1000\r\n\r\n'
+    assert b' 408 ' in answer_to(server, FORM + kind + b'token=')
+
+
+def test_the_same_trouble_is_told_once(server: Server, caplog: pytest.LogCaptureFixture) -> None:
+    """asyncio has much to say where there are more connections than files may be open."""
+    told = threading.Event()
+    for _ in range(100):
+        trouble = {'message': 'out of files', 'exception': OSError(24, 'Too many open files')}
+        server._loop.call_soon_threadsafe(server._loop.call_exception_handler, trouble)
+    server._loop.call_soon_threadsafe(told.set)
+    assert told.wait(20)
+    assert [record.getMessage() for record in caplog.records] == [
+        'viewer: out of files: [Errno 24] Too many open files'
+    ]
+    assert caplog.records[0].exc_info is None
 
 
 def test_other_addresses_need_a_token_that_is_long_enough(stub: Stub) -> None:

@@ -21,7 +21,8 @@ import socket
 import threading
 from collections.abc import Awaitable, Callable, Iterator
 from importlib import resources
-from urllib.parse import urlsplit
+from typing import Any
+from urllib.parse import SplitResult, urlsplit
 
 from aiohttp import WSMsgType, web
 
@@ -35,10 +36,14 @@ MOST_BROWSERS = 16
 SHORTEST_TOKEN = 8
 WRONG_TOKEN_S = 1.0
 """Wait after a wrong token; they are answered one at a time, so guessing is slow for everybody."""
+FORM_S = 5.0
+"""Longest wait for the rest of a form: who sends none of it would hold a connection for ever."""
 COMMANDS_S = 60
 """Requests that one browser may make each second; beyond, its socket is closed."""
 ACK_S = 10.0
 """Longest wait for a browser to have drawn a moment; one that sleeps longer is let go."""
+COMPLAINT_S = 60.0
+"""Between two words about the same trouble in the log."""
 COOKIE = 'rgbd_kcf_view'
 STATIC = ('page.css', 'page.js', 'draw.js', 'room.js')
 
@@ -53,6 +58,7 @@ _HEADERS = {
     'Cache-Control': 'no-store',
 }
 _TYPES = {'.css': 'text/css', '.js': 'text/javascript', '.html': 'text/html'}
+_LOG = logging.getLogger(__name__)
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -145,6 +151,7 @@ class Server:
 
     def _run(self, listening: socket.socket, ready: threading.Event) -> None:
         asyncio.set_event_loop(self._loop)
+        self._loop.set_exception_handler(_Complaints())
         logging.getLogger('aiohttp.server').setLevel(logging.CRITICAL)
         self._loop.run_until_complete(self._open(listening))
         ready.set()
@@ -206,7 +213,7 @@ class Server:
 
     def _refusal(self, request: web.Request) -> str | None:
         host = request.headers.get('Host', '')
-        name = urlsplit(f'//{host}').hostname or ''
+        name = _parts(f'//{host}').hostname or ''
         if not self._token and name not in LOOPBACK and not is_loopback(name):
             return f'this viewer answers to 127.0.0.1 and localhost alone, not to {name[:80]!r}'
         origin = request.headers.get('Origin')
@@ -214,7 +221,7 @@ class Server:
         if origin is None:
             needed = request.path in ('/socket', '/login')
             return 'no origin is named' if needed else None
-        parts = urlsplit(origin)
+        parts = _parts(origin)
         if parts.scheme not in ('http', 'https') or parts.netloc != host:
             return f'the page of {origin[:80]!r} may not use this viewer'
         return None
@@ -222,13 +229,18 @@ class Server:
     def _known(self, request: web.Request) -> bool:
         if not self._token:
             return True
-        return hmac.compare_digest(request.cookies.get(COOKIE, '').encode(), self._session.encode())
+        return _equal(request.cookies.get(COOKIE, ''), self._session)
 
     async def _login(self, request: web.Request) -> web.StreamResponse:
-        form = await request.post()
+        try:
+            form = await asyncio.wait_for(request.post(), FORM_S)
+        except asyncio.TimeoutError:
+            raise web.HTTPRequestTimeout from None
+        except (ValueError, LookupError, web.RequestPayloadError):
+            raise web.HTTPBadRequest from None
         given = form.get('token')
         said = given if isinstance(given, str) else ''
-        if not self._token or hmac.compare_digest(said.encode(), self._token.encode()):
+        if not self._token or _equal(said, self._token):
             response = web.Response(status=303, headers={'Location': '/'})
             response.set_cookie(
                 COOKIE, self._session, httponly=True, samesite='Strict', path='/',
@@ -323,6 +335,38 @@ class Server:
                 drawn.set()
             else:
                 self._controller.do(command)
+
+
+def _equal(given: str, secret: str) -> bool:
+    """Whether a secret was given, in a time that does not tell how much of it."""
+    return hmac.compare_digest(given.encode('utf-8', 'surrogateescape'), secret.encode())
+
+
+def _parts(url: str) -> SplitResult:
+    """The parts of an address that somebody else wrote; none where it is no address."""
+    try:
+        parts = urlsplit(url)
+        _ = parts.hostname, parts.netloc
+    except ValueError:
+        return urlsplit('')
+    return parts
+
+
+class _Complaints:
+    """Says what goes wrong beside all requests, such as more connections than files may be open.
+
+    asyncio tries a hundred times a second, and would tell each with its traceback.
+    """
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def __call__(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """See :meth:`asyncio.loop.set_exception_handler`."""
+        if loop.time() < self._next:
+            return
+        self._next = loop.time() + COMPLAINT_S
+        _LOG.warning('viewer: %s: %s', context['message'], context.get('exception', ''))
 
 
 def _waker(loop: asyncio.AbstractEventLoop, news: asyncio.Event) -> Callable[[], None]:
