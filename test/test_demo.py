@@ -132,6 +132,16 @@ def test_segment_fits_the_shared_memory() -> None:
     assert transport.segment_size(0) == 4 * megabyte
 
 
+def test_where_nothing_can_be_written_the_profile_is_taken_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a container that is read-only, and has little shared memory."""
+    (tmp_path / 'file').write_text('')
+    monkeypatch.setattr(transport.tempfile, 'gettempdir', lambda: str(tmp_path / 'file'))
+    monkeypatch.setattr(transport, 'SHM', tmp_path / 'none')
+    assert transport.fitting_profile() == transport.profile_path()
+
+
 def test_profile_is_loaded_unless_the_user_has_one(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

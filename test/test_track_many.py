@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -317,13 +318,35 @@ def test_mistakes_are_told_before_any_work(
     assert not list((recordings / 'o').rglob('*.csv'))
 
 
+def test_the_same_command_beside_itself_harms_neither(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    words = ['track', str(recordings / 'normal_0'), *WORDS, '--output', str(tmp_path / 'o')]
+    follow, ends = track.follow, list[int]()
+
+    def beside(*given: Any, **more: Any) -> track.Outcome:
+        done = follow(*given, **more)
+        ends.append(0)
+        if len(ends) == 1:  # the other ends before this one has given its file its name
+            ends.append(main(words))
+        return done
+
+    monkeypatch.setattr(track, 'follow', beside)
+    assert main(words) == 0
+    assert ends == [0, 0, 0], 'each followed once, and the other ended well'
+    assert [p.name for p in (tmp_path / 'o' / 'tracks').iterdir()] == ['normal_0.csv']
+
+
 def test_a_worker_that_dies_leaves_nothing_half(recordings: Path, tmp_path: Path):
     """The name of a file is given when it is whole; what a dead worker left is cleared away."""
     output = tmp_path / 'o' / 'tracks'
     output.mkdir(parents=True)
-    (output / '.part-normal_0.csv').write_text('half')
+    dead, alive = (output / f'.part-{token}-normal_0.csv' for token in ('0123abcd', '4567ef01'))
+    for path in (dead, alive):
+        path.write_text('half')
+    os.utime(dead, (0, 0))
     words = ['track', f'{recordings}/normal_*', '--variant', 'kcf', '--output', str(output.parent)]
     assert main([*words, '--jobs', '2']) == 0
-    assert sorted(p.name for p in output.iterdir()) == ['normal_0.csv', 'normal_1.csv']
+    assert sorted(p.name for p in output.iterdir()) == [alive.name, 'normal_0.csv', 'normal_1.csv']
     (line,) = (output.parent / 'runs.jsonl').read_text().splitlines()
     assert json.loads(line)['workers'] == LocalPool(2).describe()

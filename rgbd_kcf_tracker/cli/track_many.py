@@ -341,12 +341,13 @@ def _refuse_to_replace(jobs: Sequence[TrackJob], tables: Sequence[Path]) -> None
 def _follow(job: TrackJob) -> dict[str, Any]:
     """Follow through one recording; its files get their names when they are whole."""
     from rgbd_kcf_tracker.cli import track
+    from rgbd_kcf_tracker.recordings.outputs import clear_dead_parts, part_of
 
     wanted = {kind: Path(job.options[kind]) for kind in KINDS if job.options[kind]}
-    parts = {kind: path.with_name(f'.part-{path.name}') for kind, path in wanted.items()}
-    for path in parts.values():
+    parts = {kind: part_of(path) for kind, path in wanted.items()}
+    for path in wanted.values():
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.unlink(missing_ok=True)  # of a worker that died
+        clear_dead_parts(path)
     options = job.options | {kind: str(path) for kind, path in parts.items()}
     try:
         outcome = track.follow(argparse.Namespace(**options), watched=False)

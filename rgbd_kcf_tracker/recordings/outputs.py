@@ -17,8 +17,10 @@ import functools
 import itertools
 import logging
 import os
+import secrets
 import shutil
 import stat
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
@@ -36,6 +38,9 @@ _LOG = logging.getLogger(__name__)
 Identity = tuple[int, int]
 """Device and inode."""
 
+_PART, _TOKEN = '.part-', 8
+_DEAD_S = 3600.0
+"""Seconds after which a part that nobody writes to is of a process that died."""
 _BESIDE = ('-wal', '-shm', '-journal')
 """What SQLite keeps beside a database, by the end of its name."""
 
@@ -304,6 +309,23 @@ class FrameWriter(ABC):
             self.close(whole=False)
 
 
+def part_of(path: Path) -> Path:
+    """A hidden name beside ``path``, with its ending, that no other process takes."""
+    return path.with_name(f'{_PART}{secrets.token_hex(_TOKEN // 2)}-{path.name}')
+
+
+def clear_dead_parts(path: Path) -> None:
+    """Remove what :func:`part_of` named beside ``path`` and nobody goes on writing."""
+    with contextlib.suppress(OSError):
+        for there in path.parent.iterdir():
+            mine = (
+                there.name.startswith(_PART)
+                and there.name[len(_PART) + _TOKEN :] == f'-{path.name}'
+            )
+            if mine and time.time() - there.stat().st_mtime > _DEAD_S:
+                there.unlink()
+
+
 @contextlib.contextmanager
 def moved_into_place(path: Path) -> Iterator[Path]:
     """Another name for a file to be written, which gets its own when it is whole.
@@ -313,7 +335,7 @@ def moved_into_place(path: Path) -> Iterator[Path]:
     Raises:
         RecordingError: where it cannot be written.
     """
-    temporary = path.with_name(f'.{path.name}.{os.getpid()}')
+    temporary = part_of(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary

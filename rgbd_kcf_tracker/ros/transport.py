@@ -16,6 +16,9 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
+
 PROFILE_VARIABLE = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 SHM = Path('/dev/shm')
 _MEGABYTE = 1 << 20
@@ -68,12 +71,16 @@ def fitting_profile() -> Path | None:
 
 
 def _resized(profile: Path, size: int) -> Path:
-    """A copy of the profile with another segment size, kept for the processes that follow."""
+    """A copy of the profile with another segment size, kept for the processes that follow.
+
+    The profile itself where nothing can be written, as in a container that is read-only.
+    """
     text = profile.read_text(encoding='utf-8')
     text = re.sub(r'(<segment_size>)\d+(</segment_size>)', rf'\g<1>{size}\g<2>', text)
-    folder = Path(tempfile.gettempdir())
-    copy = folder / f'rgbd_kcf_tracker_fastdds_{size // _MEGABYTE}mb_{os.getuid()}.xml'
-    part = copy.with_suffix(f'.{os.getpid()}')
-    part.write_text(text, encoding='utf-8')
-    os.replace(part, copy)
+    try:
+        folder = Path(tempfile.gettempdir())
+        copy = folder / f'rgbd_kcf_tracker_fastdds_{size // _MEGABYTE}mb_{os.getuid()}.xml'
+        write_atomically(copy, text)
+    except (OSError, RecordingError):
+        return profile
     return copy
