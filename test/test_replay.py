@@ -242,6 +242,7 @@ def test_trackers_of_another_name_are_pointed_out(
         ({'bag': 'BAG', 'topics': '/nothing'}, 'has no topic /nothing'),
         ({'bag': 'BAG', 'topics': ['/color/image', '/nothing']}, 'has no topic /nothing.'),
         ({'bag': 'BAG', 'color_topic': '/nope'}, 'give another as -p color_topic:=TOPIC'),
+        ({'bag': 'BAG', 'info_topic': '/nope'}, 'give another as -p info_topic:=TOPIC'),
         ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 0.0}, 'ends before start'),
     ],
 )

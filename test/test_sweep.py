@@ -232,6 +232,14 @@ def test_a_sweep_from_the_command_line(tmp_path: Path, capsys):
         assert (tmp_path / 's' / name).read_bytes() == (report / name).read_bytes()
 
 
+def test_the_report_is_not_written_into_data_that_are_held_out(tmp_path: Path, capsys):
+    held = tmp_path / 'held'
+    (held / 'rgb').mkdir(parents=True)
+    words = ['sweep', 'sim:normal', '--param', 'acceptance', '--held-out', str(held)]
+    assert main([*words, '--report', str(held / 'report'), '--overwrite']) == 2
+    assert 'lies inside the source' in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ('words', 'message'),
     [

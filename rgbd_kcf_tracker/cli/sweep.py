@@ -104,7 +104,8 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.metrics import Measures
     from rgbd_kcf_tracker.evaluation.report import PAGE, Heading, write_sweep_report
 
-    check_report(args.report, args.dataset, args.overwrite)
+    held_out = [] if _is_share(args.held_out) else [args.held_out]
+    check_report(args.report, [*args.dataset, *held_out], args.overwrite)
     measures = [f.name for f in dataclasses.fields(Measures)]
     if args.measure not in measures:
         raise ParameterError(f'--measure {args.measure!r}: choose from {", ".join(measures)}')
@@ -168,16 +169,23 @@ def _split(args: argparse.Namespace) -> tuple[list[Benchmark], list[Benchmark]]:
 
     options = data_options(args)
     sequences = [s for text in args.dataset for s in open_dataset(text, options)]
+    if _is_share(args.held_out):
+        return sweep.split(distinct(sequences), float(args.held_out), args.seed)
+    held = open_dataset(args.held_out, options)
+    both = {s.name for s in sequences} & {s.name for s in held}
+    if both:
+        raise ParameterError(
+            f'--held-out {args.held_out}: {sorted(both)[0]} is among the data, too: what is '
+            'held out must not be chosen on'
+        )
+    distinct([*sequences, *held])
+    return sequences, held
+
+
+def _is_share(text: str) -> bool:
+    """Whether ``--held-out`` is a number, and no data set."""
     try:
-        share = float(args.held_out)
+        float(text)
     except ValueError:
-        held = open_dataset(args.held_out, options)
-        both = {s.name for s in sequences} & {s.name for s in held}
-        if both:
-            raise ParameterError(
-                f'--held-out {args.held_out}: {sorted(both)[0]} is among the data, too: what is '
-                'held out must not be chosen on'
-            ) from None
-        distinct([*sequences, *held])
-        return sequences, held
-    return sweep.split(distinct(sequences), share, args.seed)
+        return False
+    return True

@@ -9,6 +9,7 @@ put into ROS 2's serialisation. A sequence folder gives what ``rgbd-kcf convert`
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -78,8 +79,8 @@ class ReplaySource(Closing):
         if path.is_dir() and is_sequence_folder(path):
             self._messages = _FolderMessages(path, options)
         else:
-            named = bool(parameters.color_topic or parameters.depth_topic or parameters.lockstep)
-            self._messages = _BagMessages(path, options, named)
+            named = (parameters.color_topic, parameters.depth_topic, parameters.info_topic)
+            self._messages = _BagMessages(path, options, any(named) or parameters.lockstep)
         self.warnings += self._messages.warnings
         self.name = path.resolve().name
         self.color_topic = self._messages.color_topic
@@ -198,7 +199,7 @@ class _BagMessages:
                 raise
             problem = str(error)
         try:
-            alone = ReadOptions(color_topic=options.color_topic, depth_topic=NO_DEPTH)
+            alone = dataclasses.replace(options, depth_topic=NO_DEPTH)
             self._recording = BagRecording(path, alone)
             self.warnings.append(f'colour without depth: {problem}')
         except RecordingError:
