@@ -114,6 +114,11 @@ class Box:
         return self.x, self.y, self.width, self.height
 
 
+FOCAL_PX = (1e-3, 1e7)
+"""Least and largest focal length, in pixels: a thousandth of what an image of one pixel has, and a
+hundred times the longest lens's. Beyond, squares and quotients in metres leave the numbers."""
+
+
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
     """A pinhole camera: focal lengths and principal point in pixels, and its lens.
@@ -126,7 +131,8 @@ class Intrinsics:
         lens: of a picture that was not rectified; None for one without distortion.
 
     Raises:
-        ParameterError: where a value is not finite or a focal length is not positive.
+        ParameterError: where a value is beyond any camera's, as a file or message may claim it:
+            a principal point, or a focal length, out of :data:`FOCAL_PX`.
     """
 
     fx: float
@@ -138,12 +144,15 @@ class Intrinsics:
     def __post_init__(self) -> None:
         for name in ('fx', 'fy', 'cx', 'cy'):
             value = float(getattr(self, name))
-            if not math.isfinite(value):
-                raise ParameterError(f'intrinsics {name} is {value}: give finite pixels')
+            if not abs(value) <= FOCAL_PX[1]:
+                raise ParameterError(
+                    f'intrinsics {name} is {value:g}: give pixels, {FOCAL_PX[1]:g} at most'
+                )
             object.__setattr__(self, name, value)
-        if self.fx <= 0 or self.fy <= 0:
+        if min(self.fx, self.fy) < FOCAL_PX[0]:
             raise ParameterError(
-                f'intrinsics fx={self.fx:g} fy={self.fy:g}: focal lengths must be above 0'
+                f'intrinsics fx={self.fx:g} fy={self.fy:g}: focal lengths must be '
+                f'{FOCAL_PX[0]:g} pixels or more'
             )
 
     @classmethod

@@ -23,7 +23,7 @@ from bag_rig import Sent, camera_info, camera_messages, header, image, write_mca
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ImageError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.geometry import FOCAL_PX, Box, Intrinsics
 from rgbd_kcf_tracker.lens import Lens
 from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session
@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info, is_rectified
 from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.sequence_writer import SequenceWriter
-from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, default_parameters
+from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, create_tracker, default_parameters
 
 RAW, RECT, INFO = '/camera/color/image_raw', '/camera/color/image_rect', '/camera/color/camera_info'
 DEPTH = '/camera/aligned_depth_to_color/image_raw'
@@ -309,6 +309,8 @@ def changed(**fields: Any) -> Any:
     [
         ({'k': np.full(9, np.nan)}, 'no camera'),
         ({'k': np.full(9, -5.0)}, 'no camera'),
+        ({'k': np.diag([1e-300, 500.0, 1.0]).ravel()}, 'no camera'),
+        ({'k': np.diag([1e300, 500.0, 1.0]).ravel()}, 'no camera'),
         ({'k': np.zeros(4)}, 'no 3x3 K'),
         ({'p': np.zeros(9)}, 'no 3x3 K'),
         ({'d': np.array([np.nan, 0, 0, 0, 0])}, 'not finite'),
@@ -326,6 +328,21 @@ def test_a_camera_info_that_is_no_camera_is_refused_with_a_word(
 ) -> None:
     with pytest.raises(ImageError, match=words):
         camera_from_info(changed(**fields), RAW)
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+@pytest.mark.parametrize('focal', FOCAL_PX)
+def test_a_camera_that_is_taken_ends_no_tracker(variant: str, focal: float) -> None:
+    """Whatever is not refused can be reckoned with, as wrong as it is."""
+    color = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
+    depth = np.full((60, 80), 4.0, np.float32)
+    depth[15:45, 30:50] = 2.0
+    tracker = create_tracker(variant)
+    camera = Intrinsics(focal, focal, 40.0, 30.0)
+    tracker.start(Frame(color, depth, 0, camera), Box(30, 15, 20, 30))
+    for number in range(1, 4):
+        track = tracker.update(Frame(color, depth, number * 33_000_000, camera))
+        assert track.position is None or np.isfinite(track.position).all()
 
 
 def test_what_is_left_out_of_a_camera_info() -> None:

@@ -365,7 +365,12 @@ def test_unknown_encoding(live: Live) -> None:
     live.answered(since, 3)
     assert rig.box() is None
     live.says('bad_color', "unknown colour encoding 'bayer_magic'")
-    live.goes_on(first + 3)
+    rig.color.publish(image_message(rig.header(first + 3), scene(0)[0], 'bayer_' + 'x' * 100_000))
+    rig.send_depth(first + 3)
+    live.answered(since, 4)
+    live.says('bad_color', "unknown colour encoding 'bayer_xxx")
+    assert len(live.node.statistics.snapshot().last_error) < 1000
+    live.goes_on(first + 4)
 
 
 @pytest.mark.parametrize('fill', ['zero', 'nan'])

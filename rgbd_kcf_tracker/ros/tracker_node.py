@@ -43,6 +43,8 @@ from rgbd_kcf_tracker.variants import VARIANTS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 POLL_PERIOD_S = 0.025
 DIAGNOSTICS_PERIOD_S = 1.0
+MOST_WORDS = 500
+"""Characters that are said of a fault."""
 LOG_PERIOD_S = 5.0
 MOST_REFUSALS, REFUSALS_A_SECOND = 10, 2.0
 """Refused requests that are answered on the log at once, and for good."""
@@ -348,6 +350,8 @@ class TrackerNode(LifecycleNode):
 
     def _fault(self, kind: str, text: str) -> None:
         """Count a fault and say it, each kind every few seconds at most; refusals always."""
+        if len(text) > MOST_WORDS:  # an encoding or a model in a message may be of any length
+            text = f'{text[:MOST_WORDS]} ...'
         if kind == REJECTED:
             self._refused(text)
             return
