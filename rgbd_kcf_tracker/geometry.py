@@ -114,9 +114,12 @@ class Box:
         return self.x, self.y, self.width, self.height
 
 
-FOCAL_PX = (1e-3, 1e7)
-"""Least and largest focal length, in pixels: a thousandth of what an image of one pixel has, and a
-hundred times the longest lens's. Beyond, squares and quotients in metres leave the numbers."""
+CAMERA_PX = (1e-3, 1e7)
+"""Least and largest focal length, and largest principal point, in pixels, that a camera may state:
+a thousandth of what an image of one pixel has, and a hundred times the longest lens's."""
+RECKONABLE_PX = (1e-6, 1e10)
+"""The same of any :class:`Intrinsics`, those of reduced images too: beyond, squares and quotients
+in metres leave the numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +134,7 @@ class Intrinsics:
         lens: of a picture that was not rectified; None for one without distortion.
 
     Raises:
-        ParameterError: where a value is beyond any camera's, as a file or message may claim it:
-            a principal point, or a focal length, out of :data:`FOCAL_PX`.
+        ParameterError: where a value is not within :data:`RECKONABLE_PX`.
     """
 
     fx: float
@@ -144,15 +146,15 @@ class Intrinsics:
     def __post_init__(self) -> None:
         for name in ('fx', 'fy', 'cx', 'cy'):
             value = float(getattr(self, name))
-            if not abs(value) <= FOCAL_PX[1]:
+            if not abs(value) <= RECKONABLE_PX[1]:
                 raise ParameterError(
-                    f'intrinsics {name} is {value:g}: give pixels, {FOCAL_PX[1]:g} at most'
+                    f'intrinsics {name} is {value:g}: give pixels, {RECKONABLE_PX[1]:g} at most'
                 )
             object.__setattr__(self, name, value)
-        if min(self.fx, self.fy) < FOCAL_PX[0]:
+        if min(self.fx, self.fy) < RECKONABLE_PX[0]:
             raise ParameterError(
                 f'intrinsics fx={self.fx:g} fy={self.fy:g}: focal lengths must be '
-                f'{FOCAL_PX[0]:g} pixels or more'
+                f'{RECKONABLE_PX[0]:g} pixels or more'
             )
 
     @classmethod

@@ -23,7 +23,7 @@ from bag_rig import Sent, camera_info, camera_messages, header, image, write_mca
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ImageError, ParameterError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import FOCAL_PX, Box, Intrinsics
+from rgbd_kcf_tracker.geometry import CAMERA_PX, Box, Intrinsics
 from rgbd_kcf_tracker.lens import Lens
 from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session
@@ -311,6 +311,7 @@ def changed(**fields: Any) -> Any:
         ({'k': np.full(9, -5.0)}, 'no camera'),
         ({'k': np.diag([1e-300, 500.0, 1.0]).ravel()}, 'no camera'),
         ({'k': np.diag([1e300, 500.0, 1.0]).ravel()}, 'no camera'),
+        ({'k': np.diag([1e-4, 500.0, 1.0]).ravel()}, 'no camera: it states fx=0.0001'),
         ({'k': np.zeros(4)}, 'no 3x3 K'),
         ({'p': np.zeros(9)}, 'no 3x3 K'),
         ({'d': np.array([np.nan, 0, 0, 0, 0])}, 'not finite'),
@@ -330,16 +331,24 @@ def test_a_camera_info_that_is_no_camera_is_refused_with_a_word(
         camera_from_info(changed(**fields), RAW)
 
 
+@pytest.mark.parametrize('focal', [0.0, 1e-300, 1e300, float('nan')])
+def test_intrinsics_that_cannot_be_reckoned_with_are_refused(focal: float) -> None:
+    with pytest.raises(ParameterError, match='intrinsics fx'):
+        Intrinsics(focal, 500.0, 320.0, 240.0)
+
+
 @pytest.mark.parametrize('variant', VARIANTS)
-@pytest.mark.parametrize('focal', FOCAL_PX)
+@pytest.mark.parametrize('focal', CAMERA_PX)
 def test_a_camera_that_is_taken_ends_no_tracker(variant: str, focal: float) -> None:
-    """Whatever is not refused can be reckoned with, as wrong as it is."""
-    color = np.random.default_rng(1).integers(0, 255, (60, 80, 3), np.uint8)
-    depth = np.full((60, 80), 4.0, np.float32)
-    depth[15:45, 30:50] = 2.0
+    """Whatever is not refused can be reckoned with, as wrong as it is, in reduced images too."""
+    color = np.random.default_rng(1).integers(0, 255, (360, 480, 3), np.uint8)
+    depth = np.full((360, 480), 4.0, np.float32)
+    depth[90:270, 180:300] = 2.0
     tracker = create_tracker(variant)
-    camera = Intrinsics(focal, focal, 40.0, 30.0)
-    tracker.start(Frame(color, depth, 0, camera), Box(30, 15, 20, 30))
+    found = camera_from_info(changed(k=np.diag([focal, focal, 1.0]).ravel()), RAW)
+    assert found is not None
+    camera = found.intrinsics
+    tracker.start(Frame(color, depth, 0, camera), Box(180, 90, 120, 180))
     for number in range(1, 4):
         track = tracker.update(Frame(color, depth, number * 33_000_000, camera))
         assert track.position is None or np.isfinite(track.position).all()

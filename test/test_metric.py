@@ -83,6 +83,22 @@ def picture(seed: int = 0, size: tuple[int, int] = (240, 320)) -> Frame:
     return Frame(color, depth, seed * 33_000_000, Intrinsics(300, 300, 160, 120))
 
 
+@pytest.mark.parametrize('width', [1, 2, 40, 500])
+@pytest.mark.parametrize('height', [1, 2, 3])
+def test_pictures_of_hardly_any_pixels_end_nothing(width: int, height: int):
+    tiny = Frame(
+        np.full((height, width, 3), 90, np.uint8),
+        np.full((height, width), 4.0, np.float32),
+        99_000_000,
+    )
+    tracker = create_tracker('metric')
+    tracker.start(tiny, Box(0, 0, width, height))
+    assert tracker.update(tiny).state is not TrackState.IDLE
+    tracker.start(picture(0), Box(120, 60, 60, 140))
+    assert tracker.update(tiny).box is None
+    assert tracker.update(picture(4)).state is not TrackState.IDLE
+
+
 def test_idle_before_start():
     assert create_tracker('metric').update(picture()).state is TrackState.IDLE
 

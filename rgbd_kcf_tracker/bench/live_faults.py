@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Point, PointStamped, PolygonStamped
 from lifecycle_msgs.msg import State, Transition
@@ -38,8 +39,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
-from std_msgs.msg import Header
+from std_msgs.msg import Header, UInt32
 from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.rig import environment, resident_mb
@@ -77,6 +79,9 @@ class Target:
         self.info = make(CameraInfo, 'color/camera_info', qos)
         self.init = make(RegionOfInterest, f'{TRACKER}/init', qos)
         self.point = make(PointStamped, f'{TRACKER}/init_point', qos)
+        self.add = make(RegionOfInterest, f'{TRACKER}/add', qos)
+        self.remove = make(UInt32, f'{TRACKER}/remove', qos)
+        self.clock = make(Clock, '/clock', qos)
         self.answers: Counter[int] = Counter()
         self.values: dict[str, str] = {}
         self.node.create_subscription(PolygonStamped, f'{TRACKER}/box', self._answered, qos)
@@ -142,6 +147,11 @@ class Target:
         """The end of what it printed."""
         return self._log.read_text(encoding='utf-8', errors='replace')[-500:]
 
+    def _internal_errors(self) -> str:
+        """What the log says of them: later faults take their place in the diagnostics."""
+        lines = self._log.read_text(encoding='utf-8', errors='replace').splitlines()
+        return '\n'.join(line[:500] for line in lines if 'internal error' in line)
+
     def _check_log(self) -> None:
         text = self._log.read_text(encoding='utf-8', errors='replace')
         if 'Traceback' in text:
@@ -200,6 +210,13 @@ class Target:
         request = SetParameters.Request(parameters=[ParameterMessage(name=name, value=value)])
         return self.call(self._set, request, f'set_parameters {name}').results[0]
 
+    def choose(self) -> None:
+        """Choose the textured thing of :meth:`pair` as the target."""
+        self.init.publish(RegionOfInterest(x_offset=60, y_offset=30, width=40, height=60))
+        self.now_ns += 33_000_000
+        self.send()
+        self.spin(0.05)
+
     def reset(self) -> None:
         """Ask to drop the target, without waiting for the answer."""
         if self._reset.service_is_ready():
@@ -248,7 +265,9 @@ class Target:
             if time.monotonic() > end:
                 raise FaultFound(f'a good pair was not answered; diagnostics {self.values}')
         if int(self.values.get('internal_errors', 0)):
-            raise FaultFound(f'internal error: {self.values["last_error"]}')
+            raise FaultFound(
+                self._internal_errors() or f'internal error, not logged: {self.values}'
+            )
         assert self.process is not None
         grown = resident_mb(self.process.pid) - self.settled_mb
         if self.settled_mb and grown > GROWTH_MB:
@@ -335,15 +354,66 @@ def burst(at: Target) -> None:
 
 
 def odd_cameras(at: Target) -> None:
-    """Intrinsics that are none."""
+    """Intrinsics that are none, or fit the image and are of no camera, of a followed target."""
+    at.choose()
     for _ in range(5):
         info = CameraInfo(header=at.header())
-        info.width, info.height = _pick(at.rng, ODD_NUMBERS), _pick(at.rng, ODD_NUMBERS)
-        info.k = [float(_pick(at.rng, ODD_FLOATS)) for _ in range(9)]
-        info.p = [float(_pick(at.rng, ODD_FLOATS)) for _ in range(12)]
+        if at.rng.random() < 0.5:
+            info.width, info.height = _pick(at.rng, ODD_NUMBERS), _pick(at.rng, ODD_NUMBERS)
+            info.k = [float(_pick(at.rng, ODD_FLOATS)) for _ in range(9)]
+            info.p = [float(_pick(at.rng, ODD_FLOATS)) for _ in range(12)]
+        else:
+            focal, middle = (float(_pick(at.rng, ODD_FLOATS)) for _ in range(2))
+            info.width, info.height = WIDTH, HEIGHT
+            info.k = [focal, 0.0, middle, 0.0, focal, middle, 0.0, 0.0, 1.0]
+        info.distortion_model = _pick(at.rng, ('plumb_bob', 'equidistant', *ODD_TEXTS))
+        info.d = [float(_pick(at.rng, (0.1, *ODD_FLOATS)))] * _pick(at.rng, (0, 4, 5, 8, 100))
         at.info.publish(info)
+        at.now_ns += 33_000_000
         at.send()
+        at.spin(0.02)
     at.info.publish(CameraInfo(header=at.header()))
+
+
+def other_pictures(at: Target) -> None:
+    """Pictures of other sizes, down to nothing, and of other frames, while a target is followed."""
+    at.choose()
+    for _ in range(6):
+        at.now_ns += 33_000_000
+        width, height = (int(_pick(at.rng, (0, 1, 2, 3, 8, 40, WIDTH, 500))) for _ in range(2))
+        color, depth = at.pair()
+        for message, size in ((color, 3), (depth, 2)):
+            message.width, message.height, message.step = width, height, size * width
+            message.data = at.rng.bytes(size * width * height)
+            message.header.frame_id = _pick(at.rng, ('camera', *ODD_TEXTS))
+        at.color.publish(color)
+        at.depth.publish(depth)
+        at.spin(0.02)
+
+
+def additions(at: Target) -> None:
+    """Further targets that come and go by the hundred, of ids that nobody has."""
+    for _ in range(int(at.rng.integers(20, 200))):
+        x, y, width, height = (int(at.rng.integers(most)) for most in (WIDTH, HEIGHT, 60, 60))
+        at.add.publish(RegionOfInterest(x_offset=x, y_offset=y, width=width, height=height))
+        at.remove.publish(UInt32(data=_pick(at.rng, (1, 2, 3, *ODD_NUMBERS))))
+        if at.rng.random() < 0.1:
+            at.now_ns += 33_000_000
+            at.send()
+            at.spin(0.01)
+    at.reset()
+
+
+def clocks(at: Target) -> None:
+    """A clock on /clock that jumps and stops, taken up and left while images come."""
+    at.set('use_sim_time', ParameterValue(type=1, bool_value=True))
+    for _ in range(5):
+        seconds = int(_pick(at.rng, (0, 1, 5, 10**9, 2**31 - 1)))
+        at.clock.publish(Clock(clock=Time(sec=seconds)))
+        at.now_ns += 33_000_000
+        at.send()
+        at.spin(0.1)
+    at.set('use_sim_time', ParameterValue(type=1, bool_value=False))
 
 
 def odd_boxes(at: Target) -> None:
@@ -435,6 +505,9 @@ FAULTS: dict[Callable[[Target], None], float] = {
     lonely_streams: 2,
     burst: 2,
     odd_cameras: 2,
+    other_pictures: 2,
+    additions: 1,
+    clocks: 1,
     odd_boxes: 4,
     odd_parameters: 2,
     odd_transitions: 2,

@@ -391,7 +391,7 @@ class ByLook:
 
 
 def _step_of(frame: Frame) -> int:
-    return max(1, round(frame.width / SEARCH_WIDTH))
+    return max(1, min(round(frame.width / SEARCH_WIDTH), frame.height))
 
 
 def _averaged(frame: Frame) -> Image:

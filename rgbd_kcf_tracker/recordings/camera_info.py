@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
-from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.geometry import CAMERA_PX, Intrinsics
 
 if TYPE_CHECKING:
     from rgbd_kcf_tracker.lens import Lens
@@ -98,6 +98,11 @@ def camera_from_info(msg: Any, topic: str = '', rectified: str = AUTO) -> Camera
         )
     except RgbdKcfError as error:
         raise ImageError(f'camera_info is no camera: {error}') from None
+    least, most = CAMERA_PX
+    if min(fx, fy) < least or max(fx, fy, abs(cx), abs(cy)) > most:
+        raise ImageError(
+            f'camera_info is no camera: it states fx={fx:g} fy={fy:g} cx={cx:g} cy={cy:g} pixels'
+        )
     reduced = (width, height) != sensor
     return Camera(intrinsics, width, height, sensor if reduced else None)
 

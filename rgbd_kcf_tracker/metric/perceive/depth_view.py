@@ -48,11 +48,11 @@ class DepthView:
 
         Holes of a single pixel are filled from the pixel half a step away. Without intrinsics a
         camera of 60 degrees is assumed: sizes are then in the same wrong metre everywhere, which
-        is all the tracker needs.
+        is all the tracker needs. An image of a single row or column shows no surface: None.
         """
-        if frame.depth is None:
+        if frame.depth is None or min(frame.width, frame.height) < 2:
             return None
-        step = max(1, round(frame.width / width))
+        step = max(1, min(round(frame.width / width), frame.height // 2))
         half = step // 2
         depth = np.array(frame.depth[half::step, half::step])
         invalid = ~(depth > 0)
