@@ -255,6 +255,18 @@ def _odd_name(trial: Trial) -> None:
     trial.source = trial.source.rename(other)
 
 
+def _hidden_beside(trial: Trial) -> None:
+    """What macOS leaves beside the files that it copies to a foreign disk."""
+    for path in trial.files():
+        path.with_name(f'._{path.name}').write_bytes(trial.rng.bytes(int(trial.rng.integers(200))))
+
+
+def _line_ends(trial: Trial) -> None:
+    """Text files as an editor on another system writes them."""
+    for path in [p for p in trial.files() if p.suffix in ('.txt', '.json', '.yaml')]:
+        path.write_bytes(b'\xef\xbb\xbf' + path.read_bytes().replace(b'\n', b'\r\n'))
+
+
 SOURCE_FAULTS: dict[str, Fault] = {
     'truncated': _truncated,
     'bytes flipped': _flipped,
@@ -273,6 +285,8 @@ SOURCE_FAULTS: dict[str, Fault] = {
     'a folder in a circle': _folder_in_a_circle,
     'not readable': _unreadable,
     'a name that is no UTF-8': _odd_name,
+    'hidden files beside': _hidden_beside,
+    'line ends of another system': _line_ends,
 }
 
 
