@@ -125,6 +125,7 @@ def test_two_who_have_met_are_told_apart_again_when_they_part(walked):
         image[int(body.y) : int(body.bottom), int(body.x) : int(body.right)] = RED
         backdrop.see(image, body)
         told[k] = backdrop.outline(body, red)
+        assert backdrop.met == (told[k] is None)
         backdrop.learn(body)
     for k in (-30, -20, 20, 30):
         assert told[k] is not None
@@ -141,6 +142,19 @@ def test_a_picture_of_another_size_starts_anew(walked):
     backdrop.learn(body.over(2))
     backdrop.see(small, body.over(2))
     assert backdrop.outline(body.over(2), red) is None
+
+
+def test_the_look_of_whom_another_covers_is_not_learned():
+    """Of a passer-by before him, who would then be the target."""
+    targets, number, strangers = TargetSet('metric'), None, 0
+    for simulated in simulate('crossing', seed=73, rate_hz=10.0):
+        frame = dataclasses.replace(simulated.frame, depth=None)
+        if number is None:
+            number = targets.add(frame, simulated.visible)
+            continue
+        box = targets.update(frame)[number].box
+        strangers += box is not None and simulated.visible is None
+    assert strangers < 5
 
 
 @pytest.mark.parametrize(('scene', 'least'), [('motion', 0.9), ('approach', 0.9)])

@@ -186,19 +186,23 @@ class ByLook:
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
-        if look.ratio > self._parameters.seen_ratio:
-            self._unlearned += dt
-            if self._turn:
-                self._learn(frame, self._unlearned)
-                self._unlearned = 0.0
-            self._appearance.remember_peak(look.peak, dt)
-            self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
-        else:
-            self._appearance.remember_peak(look.peak, 0.3 * dt)
+        if self._backdrop is None or not self._backdrop.met:
+            self._believed(frame, look, dt)
         self._last_box = look.box
         if self._backdrop is not None:
             self._backdrop.learn(look.box.over(_step_of(frame)))
         self._keep(frame)
+
+    def _believed(self, frame: Frame, look: Look, dt: float) -> None:
+        if look.ratio <= self._parameters.seen_ratio:
+            self._appearance.remember_peak(look.peak, 0.3 * dt)
+            return
+        self._unlearned += dt
+        if self._turn:
+            self._learn(frame, self._unlearned)
+            self._unlearned = 0.0
+        self._appearance.remember_peak(look.peak, dt)
+        self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
 
     def _learn(self, frame: Frame, seconds: float) -> None:
         self._appearance.learn(frame.color, self._cx, self._cy, self._scale, seconds)

@@ -88,6 +88,10 @@ class Backdrop:
     Args:
         image: ``(h, w, 3)`` uint8 BGR, the first picture, made small by means over areas.
         box: the target in it, in its pixels.
+
+    Attributes:
+        met: whether in the last picture the target and somebody else were one piece, of which the
+            target's part is not known.
     """
 
     def __init__(self, image: Image, box: Box) -> None:
@@ -98,7 +102,8 @@ class Backdrop:
         self._last, self._gray, self._colors = image, gray, image.astype(np.float32)
         self._known, self._differs, self._others = (np.zeros(shape, np.bool_) for _ in range(3))
         self._same = np.zeros(shape, np.uint8)
-        self._area = self._met = 0
+        self._area = self._may_part = 0
+        self.met = False
         self._mine = self._within(box.scaled(MARGIN))
 
     def see(self, image: Image, box: Box) -> None:
@@ -109,6 +114,7 @@ class Backdrop:
             box: where the target last was.
         """
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+        self.met = False
         around = self._within(box.scaled(MARGIN)) if image.shape == self._last.shape else None
         if around is None or self._camera_moved(gray, ~around):
             self._start(image, gray, box)
@@ -164,7 +170,10 @@ class Backdrop:
         mine = (inside > 0.5 * areas) & (areas >= SPECK)
         mine[int(np.argmax(inside))] = True
         body &= mine[labels]
-        if not body.any() or self._two(body, self._others[part]):
+        if not body.any():
+            return None
+        self.met = self._meets(body, self._others[part])
+        if self.met:
             return None
         self._mine[:] = False
         self._mine[part] = cv2.dilate(body.astype(np.uint8), _ROUND) > 0
@@ -212,16 +221,16 @@ class Backdrop:
         gain = np.median(now / (self._colors[::LIT, ::LIT] + 1), axis=(0, 1))
         self._colors *= gain.astype(np.float32)
 
-    def _two(self, body: Mask, others: Mask) -> bool:
+    def _meets(self, body: Mask, others: Mask) -> bool:
         """Whether a piece is the target and somebody else whom it has met."""
         area = int(np.count_nonzero(body))
         others = cv2.dilate(others.astype(np.uint8), _ROUND) > 0
         if np.count_nonzero(body & others) > OTHERS * area:
-            self._met = PARTED
-        if self._met and area > GROWN * self._area:
+            self._may_part = PARTED
+        if self._may_part and area > GROWN * self._area:
             return True
-        self._met = max(0, self._met - 1)
-        if not self._met:
+        self._may_part = max(0, self._may_part - 1)
+        if not self._may_part:
             self._area = area
         return False
 
