@@ -30,7 +30,7 @@ from people_rig import (
 from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
-from rgbd_kcf_tracker.metric.by_surface import BySurface
+from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
 from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
@@ -52,7 +52,13 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
-from rgbd_kcf_tracker.metric.identity.stood import CARRIED_OFF, CHOSEN_MOVING, GAIN, Stood
+from rgbd_kcf_tracker.metric.identity.stood import (
+    CARRIED_OFF,
+    CHOSEN_MOVING,
+    GAIN,
+    SUDDENLY,
+    Stood,
+)
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -400,38 +406,87 @@ def test_odds_against_it_make_a_probability_less_and_leave_what_is_sure():
 TURNED = Pose(cv2.Rodrigues(np.array([0.0, 0.3, 0.0]))[0], np.array([0.05, 0.0, 0.0]))
 
 
-def stood(seconds: float = 3.0) -> tuple[Stood, np.ndarray]:
+NARROW = np.full(3, 0.05)
+
+
+def stood(seconds: float = 3.0, width: float = 0.5) -> tuple[Stood, np.ndarray]:
     """A thing seen two metres ahead for some time, before the camera turned; where it is now."""
-    place, sigma = np.array([0.2, 0.0, 2.0]), np.full(3, 0.05)
-    thing = Stood(place)
+    place = np.array([0.2, 0.0, 2.0])
+    thing = Stood(place, NARROW, width)
     for _ in range(round(seconds * 10)):
-        thing.seen(place, sigma, 0.1)
+        thing.seen(place, NARROW, 0.1)
     assert not thing.known, 'a camera that stands sees what moves'
-    thing.carried(None)
-    thing.carried(TURNED)
+    thing.carried(None, 0.1)
+    thing.carried(TURNED, 0.1)
     return thing, TURNED.of(place)
 
 
 def test_what_stood_still_is_where_it_stood_when_the_camera_has_turned():
-    sigma = np.full(3, 0.05)
     thing, here = stood()
     assert thing.known
-    there = thing.log_odds(here, sigma)
-    beside = thing.log_odds(here + np.array([0.3, 0.0, 0.0]), sigma)
-    elsewhere = thing.log_odds(here + np.array([2.0, 0.0, 0.0]), sigma)
-    assert there == pytest.approx(np.log((1 - CARRIED_OFF) * np.exp(GAIN) + CARRIED_OFF), abs=0.001)
-    assert there > beside > 0 > elsewhere
-    assert elsewhere == pytest.approx(np.log(CARRIED_OFF), abs=0.01)
+    there = thing.log_odds(here, NARROW)
+    beside = thing.log_odds(here + np.array([0.3, 0.0, 0.0]), NARROW)
+    elsewhere = thing.log_odds(here + np.array([2.0, 0.0, 0.0]), NARROW)
+    assert GAIN - 0.1 < there < GAIN
+    assert there > beside > 0 > elsewhere > np.log(SUDDENLY) - 0.01
     # The longer the camera goes on, the less surely.
     for motion in (TURNED, TURNED.inverse) * 3:
-        thing.carried(motion)
+        thing.carried(motion, 0.1)
     off = np.array([1.0, 0.0, 0.0])
-    assert 0 > thing.log_odds(here + off, sigma) > stood()[0].log_odds(here + off, sigma) + 0.5
+    assert 0 > thing.log_odds(here + off, NARROW) > stood()[0].log_odds(here + off, NARROW) + 0.5
+
+
+def test_somebody_may_have_moved_it_while_nobody_looked_but_not_between_two_frames():
+    thing, here = stood()
+    far = here + np.array([2.0, 0.0, 0.0])
+    at_once = thing.log_odds(far, NARROW)
+    thing.carried(None, 60.0)
+    assert at_once < ELSEWHERE
+    assert thing.log_odds(far, NARROW) == pytest.approx(np.log(CARRIED_OFF), abs=0.01)
+    assert at_once < thing.log_odds(far, NARROW) - 1
+    thing.seen(here, NARROW, 0.1)
+    assert thing.log_odds(far, NARROW) < at_once + 0.5, 'it was seen there just now'
+
+
+def test_a_hand_beside_a_mug_is_something_else_but_within_a_chair_is_the_chair():
+    beside = np.array([0.4, 0.0, 0.0])
+    mug, here = stood(width=0.1)
+    chair, _ = stood(width=0.8)
+    assert mug.log_odds(here + beside, NARROW) < ELSEWHERE
+    assert chair.log_odds(here + beside, NARROW) > 0
+
+
+def test_what_is_elsewhere_does_not_draw_the_place_after_it():
+    """A second chair half a metre off became the place of the first."""
+    thing, here = stood(width=0.4)
+    off = here + np.array([0.5, 0.0, 0.0])
+    before = thing.log_odds(off, NARROW)
+    for _ in range(20):
+        thing.seen(off, NARROW, 0.1)
+    assert thing.known
+    assert thing.log_odds(off, NARROW) < before + 0.5
+    near = here + np.array([0.1, 0.0, 0.0])
+    for _ in range(20):
+        thing.seen(near, NARROW, 0.1)
+    assert thing.log_odds(near, NARROW) > GAIN - 0.1, 'another side of it is'
+
+
+def test_a_place_that_is_vague_says_little():
+    place, vague = np.array([0.2, 0.0, 2.0]), np.array([0.1, 0.1, 1.0])
+    off = np.array([0.8, 0.0, 0.0])
+    odds = []
+    for sigma in (NARROW, vague):
+        thing = Stood(place, sigma, 0.1)
+        for _ in range(20):
+            thing.seen(place, sigma, 0.1)
+        thing.carried(TURNED, 0.1)
+        odds.append(thing.log_odds(TURNED.of(place) + off, NARROW))
+    assert odds[0] < ELSEWHERE < odds[1]
 
 
 def test_the_longer_a_thing_has_stood_still_the_more_that_says():
     far = np.array([3.0, 0.0, 0.0])
-    odds = [stood(seconds)[0].log_odds(far, np.full(3, 0.05)) for seconds in (0.0, 0.3, 3.0)]
+    odds = [stood(seconds)[0].log_odds(far, NARROW) for seconds in (0.0, 0.3, 3.0)]
     assert odds[0] == pytest.approx(np.log(CHOSEN_MOVING), abs=0.01)
     assert odds[0] > odds[1] + 0.3 > odds[2] + 0.6
 
@@ -440,13 +495,13 @@ def test_the_longer_a_thing_has_stood_still_the_more_that_says():
 def test_of_what_moves_or_may_have_moved_no_place_is_known(why: str):
     thing, here = stood()
     if why == 'moved':
-        thing.seen(here + np.array([1.0, 0.0, 0.0]), np.full(3, 0.05), 0.1)
+        thing.seen(here + np.array([1.0, 0.0, 0.0]), NARROW, 0.1)
     elif why == 'lost':
-        thing.carried(Lost())
+        thing.carried(Lost(), 0.1)
     else:
         thing.moves()
     assert not thing.known
-    assert thing.log_odds(here, np.full(3, 0.05)) == 0
+    assert thing.log_odds(here, NARROW) == 0
 
 
 # -- who came back --------------------------------------------------------------------------------
@@ -1205,9 +1260,11 @@ def test_a_look_found_elsewhere_is_taken_where_depth_shows_a_figure_or_the_camer
     raised: bool, step: float, found: bool
 ):
     """Depth is silent of the target; once it has gone, something that looks so is elsewhere."""
-    first, alike = Someone(-0.6, 3.0), Someone(0.6, 3.0)
+    alike = Someone(0.6, 3.0)
     tracker = create_tracker('metric')
     for i in range(10):
+        # Before a camera that moves what has never moved would be where it stood.
+        first = Someone(-0.6 - (0.2 * max(4 - i, 0) if step > 0 else 0.0), 3.0)
         color, depth = images([first] if i < 6 else [alike] if i > 7 else [])
         if not (raised and i > 7):
             depth[:] = WALL

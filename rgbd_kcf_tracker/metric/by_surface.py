@@ -116,6 +116,7 @@ class BySurface:
         person: the target as one of the crowd.
         parameters: of the tracker.
         cues: further ones for the verdict.
+        stood: where the target stands, where it was followed before; None where that is not known.
 
     Attributes:
         candidates: of the last frame, for looking at what the tracker saw.
@@ -131,6 +132,7 @@ class BySurface:
         person: Person,
         parameters: MetricParameters,
         cues: Sequence[Cue] = (),
+        stood: Stood | None = None,
     ) -> None:
         self._parameters, self._cues = parameters, cues
         self._person = person
@@ -147,7 +149,11 @@ class BySurface:
         )
         self._middle = MiddleFilter()
         self._middle.seen(scene.view, first, placed, self.body)
-        self._stood, self._dt = Stood(placed.position), 0.0
+        if stood is None:
+            stood = Stood(placed.position, placed.sigma, self.body.width)
+        else:
+            stood.point(placed.position, placed.sigma, self.body.width)
+        self._stood, self._dt = stood, 0.0
         self._cloud: HiddenCloud | None = None
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
@@ -274,7 +280,7 @@ class BySurface:
         self._dt = dt
         if self._person.figure:
             self._stood.moves()
-        self._stood.carried(scene.motion)
+        self._stood.carried(scene.motion, dt)
         if isinstance(scene.motion, Pose):
             self.motion.carried(scene.motion)
             if self._cloud is not None:
@@ -414,9 +420,9 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         self._misses = 0
 
-    def may_be_at(self, view: DepthView, box: Box) -> bool:
-        """Whether a target that stands still may be in a box of the image."""
-        return self._stood.log_odds(*self._at(view, box)) > ELSEWHERE
+    def stood_at(self, view: DepthView, box: Box) -> float:
+        """Log-odds, by where it stood, that the target is in a box of the image."""
+        return self._stood.log_odds(*self._at(view, box))
 
     def _at(self, view: DepthView, box: Box) -> tuple[FloatArray, FloatArray]:
         """Where the target would be in a box of the image, and how surely, ``(3,)`` metres each."""

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -40,8 +41,11 @@ from rgbd_kcf_tracker.track import Track, TrackState
 
 FloatArray = npt.NDArray[np.float64]
 
-LOOK_SIGMA = np.full(3, 0.1)
-"""Metres by which the middle of a box found by look is off the target's."""
+LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
+"""Metres, and shares of its width, by which the middle of a box found by look is off the target's:
+cells of the filter are a tenth of it, and depth is that of any of its sides."""
+ABOUT = 1.5
+"""Times its size that the surroundings of a box are in which depth is read of what has none."""
 EVEN = 0.5
 """Probability from which a box is shown as the target's alone."""
 SURE = 0.6
@@ -224,7 +228,9 @@ class Follower:
             self.person = self._crowd.chosen(account, seen)
             for cue in self._cues:
                 cue.start(frame, box, self.person.number)
-        self._surface = BySurface(account, seen, self.person, self._parameters, self._cues)
+        self._surface = BySurface(
+            account, seen, self.person, self._parameters, self._cues, self._stood
+        )
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
 
     def _depth_of_surface(self) -> float | None:
@@ -284,7 +290,7 @@ class Follower:
         if self.person is not None and score >= SURE:
             for cue in self._cues:
                 cue.learn(frame, box, self.person.number)
-        if self._look is not None and not found.seen.cut.any:
+        if self._look is not None and not found.seen.cut.any and score >= SURE:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, score, found.seen.depth, surface.belief())
 
@@ -370,15 +376,15 @@ class Follower:
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
                 look = self._look.glance(frame, box, dt)
+                stood = 0.0 if look is None else surface.stood_at(view, look.box)
                 if (
                     look is not None
-                    and surface.may_be_at(view, look.box)
+                    and stood > ELSEWHERE
                     and not self._stood_there(account, look.box)
                 ):
                     surface.seen_elsewhere(view, look.box)
-                    return self._tracked(
-                        frame, look.box, _score(look), look.depth, surface.belief()
-                    )
+                    score = _score(look, stood)
+                    return self._tracked(frame, look.box, score, look.depth, surface.belief())
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
@@ -396,11 +402,11 @@ class Follower:
     def _by_look(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Track:
         assert self._look is not None
         self._follow_size(frame)
-        if account is not None and account.scene.motion is not None:
-            self._carried = True
+        if account is not None:
+            self._carried |= account.scene.motion is not None
             if self._stood is not None:
-                self._stood.carried(account.scene.motion)
-        look = self._look.step(frame, dt, turn)
+                self._stood.carried(account.scene.motion, dt)
+        look, stood = self._look.step(frame, dt, turn), 0.0
         if look is not None and account is not None:
             # Depth shows no such thing: a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
@@ -410,11 +416,13 @@ class Follower:
                 look = None
         if look is not None:
             self._look.take(frame, look, dt)
-            if account is not None and look.depth is not None:
-                place = _place(account.scene.view, look.box, look.depth)
+            at = None if account is None else _place(account.scene.view, look)
+            if at is not None:
+                place, sigma, width = at
                 if self._stood is None:
-                    self._stood = Stood(place)
-                self._stood.seen(place, LOOK_SIGMA, dt)
+                    self._stood = Stood(place, sigma, width)
+                self._stood.seen(place, sigma, dt)
+                stood = self._stood.log_odds(place, sigma)
             self._last_box, self._unseen, self._carried = look.box, 0.0, False
         else:
             self._unseen += dt
@@ -427,7 +435,7 @@ class Follower:
             return self._tracked(frame, box, NEW_SCORE, self.seen.depth, self._surface.belief())
         if look is None:
             return self._hidden(frame, dt)
-        return self._tracked(frame, look.box, _score(look), look.depth)
+        return self._tracked(frame, look.box, _score(look, stood), look.depth)
 
     def _follow_size(self, frame: Frame) -> None:
         """Carry the last box over to a stream whose image size has changed."""
@@ -438,11 +446,12 @@ class Follower:
             self._size_of_image = frame.width, frame.height
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
-        """Whether what is found again is not where the target, which does not move, stood."""
-        if self._stood is None or self._unseen == 0 or look.depth is None:
+        """Whether what is found elsewhere is not where the target, which does not move, stood."""
+        at = _place(account.scene.view, look)
+        followed = self._unseen == 0 and look.box.intersection(self._last_box) > 0
+        if self._stood is None or followed or at is None:
             return False
-        place = _place(account.scene.view, look.box, look.depth)
-        return self._stood.log_odds(place, LOOK_SIGMA) < ELSEWHERE
+        return self._stood.log_odds(*at[:2]) < ELSEWHERE
 
     def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
@@ -494,6 +503,8 @@ class Follower:
         chosen; depth often begins some way inside of the image.
         """
         best, likest = None, 0.0
+        if self._stood is not None and self._stood.known:  # what stands still does not come
+            return None
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
             known = row >= 0 and account.people[row].first_seen <= self._since
@@ -571,9 +582,15 @@ class Follower:
         )
 
 
-def _score(look: Look) -> float:
-    """Probability that a box found by look is right, from the response against its mean."""
-    return float(min(max(look.ratio, 0.0), SUREST_LOOK))
+def _score(look: Look, stood: float) -> float:
+    """Probability that a box found by look is right, from the response against its mean.
+
+    Args:
+        look: that found it.
+        stood: log-odds of its place, which only speak against it: what stood there is there too.
+    """
+    ratio = float(min(max(look.ratio, 0.0), SUREST_LOOK))
+    return ratio if stood >= 0 else 1 / (1 + math.exp(-logit(ratio) - stood))
 
 
 def _ends(box: Box, scene: Scene) -> Sides:
@@ -595,9 +612,25 @@ def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     return scene.view.part(b.x, b.y, b.right, b.bottom)
 
 
-def _place(view: DepthView, box: Box, depth: float) -> FloatArray:
-    """Where the middle of a box of the image is at a depth, ``(3,)`` metres."""
-    return np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
+def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:
+    """Where the middle of what was found is, ``(3,)`` metres, how surely, and its width there.
+
+    What has no reading itself is about as deep as what is read beside it, as far as that agrees.
+    None where nothing is.
+    """
+    box, depth, spread = look.box, look.depth, 0.0
+    if depth is None:
+        b = box.scaled(ABOUT).over(view.step)
+        read = view.depth[view.part(b.x, b.y, b.right, b.bottom)]
+        read = read[read > 0]
+        if not read.size:
+            return None
+        low, depth, high = np.percentile(read, (16, 50, 84)).tolist()
+        spread = (high - low) / 2
+    place = np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
+    width = box.width / view.step * depth / view.intrinsics.fx
+    aside = np.abs(place) / depth * spread
+    return place, np.hypot(LOOK_OFF + LOOK_OFF_SHARE * width, aside), width
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:

@@ -20,15 +20,18 @@ CHOSEN_MOVING = 0.5
 """Probability that a thing moves, before it was seen for a while: it may or may not."""
 STANDS = 0.3
 """Seconds of standing still after which that is a third: what moves shows it in half a second."""
-OFF = 0.25
-"""Metres by which what is seen of a thing that stands still is elsewhere: another side, a part."""
+OFF, OFF_SHARE = 0.05, 0.3
+"""Metres, and shares of its width, by which what is seen of a thing that stands still is elsewhere:
+another side, a part (of places all over its width the deviation is 0.29 of that). A quarter of a
+metre whatever its size made the wall beside a mug the mug."""
 DRIFT = 0.1
 """Metres by which the camera's own motion is off after each radian of turning and metre of way; on
 ``redkitchen`` it is off by 0.02 to 0.06 after 1.5 radians, at 5 to 30 frames a second."""
 STEADY = 1.0
 """Seconds in which a place is taken on from what is seen there."""
-CARRIED_OFF = 0.1
-"""Probability that somebody moves a thing while nobody looks."""
+CARRIED_OFF, SUDDENLY, CARRYING = 0.1, 0.01, 3.0
+"""Probability that somebody moves a thing while nobody looks, that it is elsewhere all at once
+between two frames, and the seconds it takes to come over: what is carried off is seen to go."""
 GAIN = 1.5
 """Log-odds of what is where it stood: few other things fit there, but what it stood on is there."""
 
@@ -38,15 +41,23 @@ class Stood:
 
     Args:
         place: ``(3,)`` metres in the camera's frame.
+        sigma: ``(3,)`` metres, its deviation.
+        width: of the target, metres.
     """
 
-    def __init__(self, place: FloatArray) -> None:
-        self._place = np.array(place, np.float64)
-        self._off = self._for = 0.0
+    def __init__(self, place: FloatArray, sigma: FloatArray, width: float) -> None:
+        self._off = self._for = self._unseen = 0.0
+        self.point(place, sigma, width)
         self._known, self._carried = True, False
 
-    def carried(self, motion: Pose | Lost | None) -> None:
-        """Keep the place in the world while the camera moves, as far as that is known."""
+    def point(self, place: FloatArray, sigma: FloatArray, width: float) -> None:
+        """Say the place of the same target by another point of it, as its upper edge."""
+        self._place, self._vague = np.array(place, np.float64), float(sigma.max())
+        self._size = OFF + OFF_SHARE * width
+
+    def carried(self, motion: Pose | Lost | None, dt: float) -> None:
+        """Keep the place in the world while the camera moves, ``dt`` seconds, as far as known."""
+        self._unseen += dt
         if isinstance(motion, Lost):
             self.moves()  # or seems to
         elif motion is not None:
@@ -58,12 +69,17 @@ class Stood:
     def seen(self, place: FloatArray, sigma: FloatArray, dt: float) -> None:
         """Take where the target is, ``(3,)`` metres, each axis with its own deviation."""
         off = place - self._place
-        if np.any(np.abs(off) > 3 * np.hypot(sigma, OFF + self._off)):
+        if np.any(np.abs(off) > 3 * np.hypot(sigma, self._size + self._off)):
             self.moves()
+        near, _ = self._likely(place, sigma)
+        if near < 1:  # as likely anywhere else: that says nothing of where it stood
+            return
         share = 1 - math.exp(-dt / STEADY)
         self._place += share * off
+        self._vague += share * (float(sigma.max()) - self._vague)
         self._off *= 1 - share
         self._for += dt
+        self._unseen = 0.0
 
     def moves(self) -> None:
         """The target is one that moves."""
@@ -86,7 +102,14 @@ class Stood:
         """
         if not self.known:
             return 0.0
-        variance = np.square(sigma) + (OFF + self._off) ** 2
-        near = math.exp(GAIN - 0.5 * float((np.square(place - self._place) / variance).sum()))
-        moved = CARRIED_OFF + (CHOSEN_MOVING - CARRIED_OFF) * math.exp(-self._for / STANDS)
+        near, moved = self._likely(place, sigma)
         return math.log((1 - moved) * near + moved)
+
+    def _likely(self, place: FloatArray, sigma: FloatArray) -> tuple[float, float]:
+        """How likely a place is if the target stands, against any other, and that it moved."""
+        variance = np.square(sigma) + (self._size + self._off) ** 2 + self._vague**2
+        near = math.exp(GAIN - 0.5 * float((np.square(place - self._place) / variance).sum()))
+        still = 1 - math.exp(-self._for / STANDS)
+        carried_off = CARRIED_OFF + (SUDDENLY - CARRIED_OFF) * math.exp(-self._unseen / CARRYING)
+        moved = CHOSEN_MOVING + (carried_off - CHOSEN_MOVING) * still
+        return near, moved
