@@ -379,7 +379,7 @@ class Follower:
                 stood = 0.0 if look is None else surface.stood_at(view, look.box)
                 if (
                     look is not None
-                    and stood > ELSEWHERE
+                    and stood >= ELSEWHERE
                     and not self._stood_there(account, look.box)
                 ):
                     surface.seen_elsewhere(view, look.box)
@@ -428,7 +428,10 @@ class Follower:
             self._unseen += dt
         # He came at some time since the frame before, that is in time where that was.
         in_time = self._unseen - dt < NEWCOMER
-        if account is not None and in_time and self._agree(frame, account, look):
+        # What is not where the target stood may be followed, but is not what it is known by.
+        if stood < 0:
+            self._agreed = 0
+        elif account is not None and in_time and self._agree(frame, account, look):
             assert self._surface is not None
             assert self.seen is not None
             box = outline_box(account.scene, self.seen)
