@@ -12,6 +12,9 @@ from rgbd_kcf_tracker.errors import BoxError, ParameterError
 
 TYPE_CHECKING = False  # that of typing costs an import
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from rgbd_kcf_tracker.lens import Lens
 
 
@@ -86,6 +89,10 @@ class Box:
         """The box in an image of which every ``step``-th pixel is taken."""
         return Box(self.x / step, self.y / step, self.width / step, self.height / step)
 
+    def stretched(self, across: float, down: float) -> Box:
+        """The box in the same image when that has become wider and higher by these factors."""
+        return Box(self.x * across, self.y * down, self.width * across, self.height * down)
+
     def moved(self, dx: float, dy: float) -> Box:
         """The box shifted by ``dx, dy`` pixels."""
         return Box(self.x + dx, self.y + dy, self.width, self.height)
@@ -112,6 +119,14 @@ class Box:
     def as_tuple(self) -> tuple[float, float, float, float]:
         """``(x, y, width, height)``."""
         return self.x, self.y, self.width, self.height
+
+
+def mask_box(mask: npt.NDArray[np.bool_]) -> Box | None:
+    """The smallest box around the set pixels of ``(h, w)`` bool; None where there are none."""
+    (rows,), (cols,) = mask.any(axis=1).nonzero(), mask.any(axis=0).nonzero()
+    if rows.size == 0:
+        return None
+    return Box.from_corners(float(cols[0]), float(rows[0]), cols[-1] + 1.0, rows[-1] + 1.0)
 
 
 CAMERA_PX = (1e-3, 1e7)

@@ -271,8 +271,7 @@ class ByLook:
         self._flow.forget()
         self._elsewhere.forget()
         self._cx, self._cy = self._cx * across, self._cy * down
-        b = self._last_box
-        self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
+        self._last_box = self._last_box.stretched(across, down)
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
         self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))

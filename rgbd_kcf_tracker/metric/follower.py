@@ -444,8 +444,7 @@ class Follower:
         """Carry the last box over to a stream whose image size has changed."""
         width, height = self._size_of_image
         if (frame.width, frame.height) != (width, height):
-            across, down, b = frame.width / width, frame.height / height, self._last_box
-            self._last_box = Box(b.x * across, b.y * down, b.width * across, b.height * down)
+            self._last_box = self._last_box.stretched(frame.width / width, frame.height / height)
             self._size_of_image = frame.width, frame.height
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:

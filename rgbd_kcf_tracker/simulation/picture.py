@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.geometry import Box, Intrinsics, mask_box
 from rgbd_kcf_tracker.simulation.room import draw_face
 from rgbd_kcf_tracker.simulation.solids import Layer, Lighting, render
 from rgbd_kcf_tracker.simulation.world import Actor, Vector, View, World
@@ -241,14 +241,6 @@ class Picture:
         shown = mask_box(mask)
         fraction = int(np.count_nonzero(mask)) / max(whole, 1)
         return Truth(shown and shown.moved(left, top), body, fraction, (x, y, z))
-
-
-def mask_box(mask: npt.NDArray[np.bool_]) -> Box | None:
-    """The smallest box around the set pixels."""
-    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if rows.size == 0:
-        return None
-    return Box.from_corners(float(cols[0]), float(rows[0]), cols[-1] + 1.0, rows[-1] + 1.0)
 
 
 def _blurred(image: npt.NDArray[np.uint8], dx: float, dy: float) -> npt.NDArray[np.uint8]:

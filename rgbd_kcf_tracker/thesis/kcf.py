@@ -288,8 +288,7 @@ class KcfTracker:
         """Carry the target over to a stream whose image size has changed."""
         across = frame.width / self._image_size[0]
         down = frame.height / self._image_size[1]
-        box = self._box
-        self._box = Box(box.x * across, box.y * down, box.width * across, box.height * down)
+        self._box = self._box.stretched(across, down)
         self._image_size = (frame.width, frame.height)
         if self._model is not None:
             self._model.rescale(across, down)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_of
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 
 Image = npt.NDArray[np.uint8]
 
@@ -62,17 +62,17 @@ class Elsewhere:
             image: ``(h, w, 3)`` uint8 BGR, of now.
             box: in its pixels.
         """
-        part = _part(image, box.scaled(MIDDLE))
+        part = part_in(image.shape, box.scaled(MIDDLE))
         for then, place in self._kept:
             elsewhere = np.ones(then.shape[:2], np.bool_)
-            elsewhere[_part(then, place)] = False
+            elsewhere[part_in(then.shape, place)] = False
             if _same(image, then, part, elsewhere):
                 return True
         if self._refused is None:
             return False
         then, place = self._refused
         there = np.zeros(then.shape[:2], np.bool_)
-        there[_part(then, place)] = True
+        there[part_in(then.shape, place)] = True
         return _same(image, then, part, there)
 
 
@@ -85,8 +85,3 @@ def _same(now: Image, then: Image, part: tuple[slice, slice], there: npt.NDArray
         return False
     change = cv2.absdiff(now[part], then[part]).max(axis=2)[there]
     return float(np.mean(change < SAME_COLOR)) > UNCHANGED
-
-
-def _part(image: Image, box: Box) -> tuple[slice, slice]:
-    """Rows and columns that a box covers."""
-    return part_of(image.shape, box.x, box.y, box.right, box.bottom)

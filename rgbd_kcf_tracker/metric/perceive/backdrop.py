@@ -18,17 +18,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.features.optical_flow import followed
-from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_of
-from rgbd_kcf_tracker.metric.perceive.ego_motion import (
-    CORNER_DISTANCE,
-    CORNER_QUALITY,
-    CORNERS,
-    LEAST_CORNERS,
-    changed,
-    stands,
-)
+from rgbd_kcf_tracker.geometry import Box, mask_box
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in, part_of
+from rgbd_kcf_tracker.metric.perceive.ego_motion import changed, corners_between, stands
 
 Image = npt.NDArray[np.uint8]
 Mask = npt.NDArray[np.bool_]
@@ -47,6 +39,10 @@ of somebody's clothes but the plainest stays alike for longer."""
 MARGIN = 1.15
 """Sides of the box, in units of the target's, inside which nothing is learned unless its outline is
 known: an arm or a foot sticks out by so much."""
+ASIDE, HIGH = 1.2, 1.8
+"""Of the part of the picture in which the outline is sought: how much wider than the box, in the
+box's heights, and how many times as high. Arms stretched out are as wide as somebody is high, and
+the box may have stayed behind."""
 LIT = 4
 """Every so many pixels tell of the light: some thousand, enough for a median."""
 LEAST_KNOWN = 0.5
@@ -130,8 +126,9 @@ class Backdrop:
 
     def learn(self, box: Box) -> None:
         """Take what has not changed for the backdrop, but for the target, which is in ``box``."""
-        mine = self._mine | self._within(box.scaled(MARGIN))
-        self._same[self._within(box.scaled(MARGIN))] = 0
+        within = self._within(box.scaled(MARGIN))
+        mine = self._mine | within
+        self._same[within] = 0
         still = (self._same >= STABLE) & ~mine
         np.copyto(self._colors, self._last, where=still[:, :, None])
         self._known |= still
@@ -148,14 +145,14 @@ class Backdrop:
             None where nothing moves there, or two have met who cannot be told apart.
         """
         part = self._part(
-            Box.from_center(box.cx, box.cy, box.width + 1.2 * box.height, 1.8 * box.height)
+            Box.from_center(box.cx, box.cy, box.width + ASIDE * box.height, HIGH * box.height)
         )
         known, differs = self._known[part], self._differs[part]
         if not differs.any():
             return None
         rows, cols = part
-        b = Box(box.x - cols.start, box.y - rows.start, box.width, box.height)
-        own, about = (part_of(known.shape, *_sides(each)) for each in (b, b.scaled(MARGIN)))
+        b = box.moved(-cols.start, -rows.start)
+        own, about = (part_in(known.shape, each) for each in (b, b.scaled(MARGIN)))
         body = differs.copy()
         body[own] |= ~known[own] & (posterior(self._last[part][own]) > 0.5)
         # What goes on behind what the target has covered is a piece of it.
@@ -170,20 +167,21 @@ class Backdrop:
         mine = (inside > 0.5 * areas) & (areas >= SPECK)
         mine[int(np.argmax(inside))] = True
         body &= mine[labels]
-        if not body.any():
+        bounds = mask_box(body)
+        if bounds is None:
             return None
         self.met = self._meets(body, self._others[part])
         if self.met:
             return None
         self._mine[:] = False
         self._mine[part] = cv2.dilate(body.astype(np.uint8), _ROUND) > 0
-        end = _ended(_bounds(body), b, known)
+        end = _ended(bounds, b, known)
         told = body & differs
         columns = np.count_nonzero(told, axis=0)
         area = int(columns.sum())
         middle = columns @ np.arange(len(columns)) / max(area, 1) + 0.5
         return Outline(
-            Box(end.x + cols.start, end.y + rows.start, end.width, end.height),
+            end.moved(cols.start, rows.start),
             float(middle) + cols.start,
             area / int(np.count_nonzero(body)),
         )
@@ -191,7 +189,7 @@ class Backdrop:
     # -- parts ------------------------------------------------------------------------------------
 
     def _part(self, box: Box) -> tuple[slice, slice]:
-        return part_of(self._last.shape, *_sides(box))
+        return part_in(self._last.shape, box)
 
     def _within(self, box: Box) -> Mask:
         mask = np.zeros(self._last.shape[:2], np.bool_)
@@ -202,18 +200,8 @@ class Backdrop:
         """Whether the camera has moved, or nothing tells that it has not."""
         if not changed(self._gray, gray, outside):
             return False
-        corners = cv2.goodFeaturesToTrack(
-            self._gray,
-            CORNERS,
-            CORNER_QUALITY,
-            CORNER_DISTANCE,
-            mask=outside.astype(np.uint8) * 255,
-        )
-        if corners is None or len(corners) < LEAST_CORNERS:
-            return True
-        corners = corners.reshape(-1, 2)
-        found, good = followed(self._gray, gray, corners)
-        return not stands(corners[good], found[good])
+        corners = corners_between(self._gray, gray, outside)
+        return corners is None or not stands(*corners)
 
     def _follow_light(self, image: Image) -> None:
         """Light that changes changes all alike: the median pixel is what it was."""
@@ -235,20 +223,9 @@ class Backdrop:
         return False
 
 
-def _sides(box: Box) -> tuple[float, float, float, float]:
-    return box.x, box.y, box.right, box.bottom
-
-
-def _bounds(mask: Mask) -> Box:
-    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    return Box.from_corners(
-        float(cols[0]), float(rows[0]), float(cols[-1] + 1), float(rows[-1] + 1)
-    )
-
-
 def _ended(outline: Box, box: Box, known: Mask) -> Box:
     """The outline's box, but for sides inside of ``box`` that lie in what is not known."""
-    left, top, right, bottom = _sides(outline)
+    left, top, right, bottom = outline.x, outline.y, outline.right, outline.bottom
     if left > box.x and not _mostly(known, box.x, box.y, left, box.bottom):
         left = box.x
     if right < box.right and not _mostly(known, right, box.y, box.right, box.bottom):

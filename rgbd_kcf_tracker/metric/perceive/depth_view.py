@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 DepthArray = npt.NDArray[np.float32]
 
@@ -25,6 +25,11 @@ def part_of(
         slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
         slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
     )
+
+
+def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
+    """Rows and columns of what a box covers, as far as it is in an image."""
+    return part_of(shape, box.x, box.y, box.right, box.bottom)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

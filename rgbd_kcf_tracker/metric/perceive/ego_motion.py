@@ -103,6 +103,29 @@ def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | Non
     return bool(np.count_nonzero(moved) >= max(CHANGED_SHARE * asked, 1))
 
 
+def corners_between(
+    last: GrayImage, gray: GrayImage, usable: npt.NDArray[np.bool_]
+) -> tuple[Points, Points] | None:
+    """Corners of a picture, and where they are in the next, ``(n, 2)`` each.
+
+    Args:
+        last: ``(h, w)`` uint8, the picture before.
+        gray: that of now.
+        usable: ``(h, w)`` bool, where corners are taken.
+
+    Returns:
+        None where there are too few.
+    """
+    corners = cv2.goodFeaturesToTrack(
+        last, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
+    )
+    if corners is None or len(corners) < LEAST_CORNERS:
+        return None
+    corners = corners.reshape(-1, 2)
+    found, good = followed(last, gray, corners)
+    return corners[good], found[good]
+
+
 def stands(first: Points, second: Points) -> bool:
     """Whether the camera stands still, by where its corners ``(n, 2)`` were and are."""
     still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
@@ -118,17 +141,10 @@ def upper_median(values: GrayImage) -> int:
 def _told(
     last: GrayImage, last_view: DepthView, gray: GrayImage, others: npt.NDArray[np.bool_]
 ) -> Pose | Lost | None:
-    usable = (last_view.depth > 0) & ~others
-    corners = cv2.goodFeaturesToTrack(
-        last, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
-    )
-    if corners is None or len(corners) < LEAST_CORNERS:
+    corners = corners_between(last, gray, (last_view.depth > 0) & ~others)
+    if corners is None or len(corners[0]) < LEAST_CORNERS:
         return Lost()
-    corners = corners.reshape(-1, 2)
-    found, good = followed(last, gray, corners)
-    first, second = corners[good].astype(np.float64), found[good].astype(np.float64)
-    if len(first) < LEAST_CORNERS:
-        return Lost()
+    first, second = (points.astype(np.float64) for points in corners)
     if stands(first, second):
         return None
     k = last_view.intrinsics
