@@ -64,6 +64,12 @@ its middle, and to its height: less is an arm."""
 OUTLINE_TIME = 0.45
 """Seconds in which the filter follows the outline's height: longer than a step, shorter than it
 takes to sit down."""
+LEAST_SHARE = 0.3
+"""Share of the target's area below which what moves where it was is not shown as the target: a head
+and shoulders are more, a hand and what casts a shadow less."""
+ALIKE = 0.9
+"""Times the target's own of how likely the colours of what moves are its: a part of somebody is as
+likely as the whole of him, within a tenth."""
 SEARCH_WIDTH = 240
 """Columns of the image in which colours are searched, about those of the view of depth: it costs
 the same at any resolution."""
@@ -90,12 +96,14 @@ class Look:
         ratio: the filter's response against its own recent mean.
         peak: the response.
         depth: of the target in metres, None where there is no reading on it.
+        moved: whether it is told by what moves alone, as it looks like something else.
     """
 
     box: Box
     ratio: float
     peak: float
     depth: float | None
+    moved: bool = False
 
 
 class ByLook:
@@ -177,8 +185,12 @@ class ByLook:
             self._hidden = sighting.ratio < parameters.hidden_ratio
         self.response = sighting.ratio
         if self._hidden:
-            self._lose(frame)
-            return None
+            look = self._moving(frame)
+            if look is None:
+                self._lose(frame)
+                return None
+            self._hidden = False
+            return look
         return self._outlined(frame, self._found(frame, sighting, dt), dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
@@ -186,7 +198,7 @@ class ByLook:
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
-        if self._backdrop is None or not self._backdrop.met:
+        if not look.moved and (self._backdrop is None or not self._backdrop.met):
             self._believed(frame, look, dt)
         self._last_box = look.box
         if self._backdrop is not None:
@@ -259,7 +271,7 @@ class ByLook:
     def _lose(self, frame: Frame) -> None:
         self._flow.forget()
         if self._backdrop is not None:
-            self._backdrop.learn(self._last_box.over(_step_of(frame)))
+            self._backdrop.miss(self._last_box.over(_step_of(frame)))
 
     def _follow_size(self, frame: Frame) -> None:
         """Carry the target over to a stream whose image size has changed."""
@@ -358,6 +370,26 @@ class ByLook:
         self._rescale(frame, depth, sighting, dt)
         box = Box.from_center(self._cx, self._cy, *self._size)
         return Look(box, sighting.ratio, sighting.peak, depth)
+
+    def _moving(self, frame: Frame) -> Look | None:
+        """The target by what moves where it was: something hides a part of it, or it has turned."""
+        if self._backdrop is None:
+            return None
+        step = _step_of(frame)
+        whole = Box.from_center(self._cx, self._cy, *self._size)
+        piece = self._backdrop.follow(whole.over(step), self._appearance.posterior)
+        if piece is None or piece.share < LEAST_SHARE or piece.alike < ALIKE:
+            return None
+        box = piece.box.over(1 / step)
+        width, height = self._size
+        if box.height > SAME_HEIGHT * height:
+            return None
+        # It is expected where the piece is a part of it, with the least step.
+        left, right = sorted((box.right - width / 2, box.x + width / 2))
+        top, bottom = sorted((box.bottom - height / 2, box.y + height / 2))
+        self._cx = min(max(self._cx, left), right)
+        self._cy = min(max(self._cy, top), bottom)
+        return Look(box, self._parameters.hidden_ratio, 0.0, None, moved=True)
 
     def _outlined(self, frame: Frame, look: Look, dt: float) -> Look:
         """What the look has found, with arms and legs where they show before what stands still."""

@@ -5,8 +5,9 @@
 
 Where depth says nothing, the backdrop is what has looked the same for some frames while the target
 was elsewhere. What differs from it moves, and the piece of that which lies in the target's box is
-the target with its arms and legs, which a filter's box of fixed proportions cuts off. Nothing is
-said of what the target has covered since it was chosen, nor once the camera has moved.
+the target with its arms and legs, which a filter's box of fixed proportions cuts off. What that
+piece becomes is the target, whatever it looks like, and so is what comes out where it went. Nothing
+is said of what the target has covered since it was chosen, nor once the camera has moved.
 """
 
 from __future__ import annotations
@@ -57,8 +58,23 @@ twice as much, and who stretches out an arm has a tenth more."""
 PARTED = 20
 """Frames in which two who have met may part again, the one hidden by the other between: as long as
 somebody takes to pass before another at the pace of a walk and 10 Hz."""
+MOSTLY_TOLD = 0.5
+"""Share of an outline that must differ from the backdrop for its colours to be the target's own."""
+WHOLE = 0.85
+"""Times the filter's height from which an outline is all of the target, not a part that shows."""
 SPECK = 4
 """Pixels of a piece below which it is noise."""
+GOES_ON = 0.3
+"""Share of the smaller of two pieces in which both must lie for one to be what the other was a
+picture ago: of who walks at 10 Hz it is more than half."""
+COMES_OUT = 1.5
+"""Sides, in units of the last box, inside which comes out who was hidden there: who comes out
+elsewhere may be another who was behind the same thing."""
+LEAPT = 0.6
+"""Share of its area from which a target that is gone by the next picture was not hidden by what
+stands still, but has leapt: at 10 Hz nobody is behind a door's post in less than two."""
+AS_LARGE = 1.3
+"""Times, or parts of, the target's area of a piece that may be the target that has leapt."""
 _ROUND = np.ones((3, 3), np.uint8)
 
 
@@ -76,6 +92,21 @@ class Outline:
     box: Box
     cx: float
     told: float
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """The piece of a picture that moves and is the target by where it was.
+
+    Attributes:
+        box: about it, in pixels of the picture.
+        share: its area, in units of the target's own.
+        alike: how likely its colours are the target's, in units of the target's own.
+    """
+
+    box: Box
+    share: float
+    alike: float
 
 
 class Backdrop:
@@ -96,7 +127,10 @@ class Backdrop:
     def _start(self, image: Image, gray: Image, box: Box) -> None:
         shape = image.shape[:2]
         self._last, self._gray, self._colors = image, gray, image.astype(np.float32)
-        self._known, self._differs, self._others = (np.zeros(shape, np.bool_) for _ in range(3))
+        self._known, none = np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+        self._differs = self._others = self._appeared = self._body = self._was = none
+        self._pieces = _pieces(none)
+        self._likely = self._share = self._fill = 0.0
         self._same = np.zeros(shape, np.uint8)
         self._area = self._may_part = 0
         self.met = False
@@ -119,7 +153,7 @@ class Backdrop:
         self._same[cv2.absdiff(image, self._last).max(axis=2) > SAME] = 0
         self._follow_light(image)
         apart = cv2.absdiff(image, cv2.convertScaleAbs(self._colors)).max(axis=2)
-        self._differs = self._known & (apart > DIFFERS)
+        self._part_in_pieces(self._known & (apart > DIFFERS))
         # Until an outline tells the target from the rest, all that moves may be a part of it.
         self._mine = self._differs | around
         self._last, self._gray = image, gray
@@ -128,11 +162,14 @@ class Backdrop:
         """Take what has not changed for the backdrop, but for the target, which is in ``box``."""
         within = self._within(box.scaled(MARGIN))
         mine = self._mine | within
-        self._same[within] = 0
-        still = (self._same >= STABLE) & ~mine
-        np.copyto(self._colors, self._last, where=still[:, :, None])
-        self._known |= still
+        self._take(mine, within)
         self._others = self._differs & ~mine
+        self._appeared = np.zeros_like(mine)
+
+    def miss(self, box: Box) -> None:
+        """Take what has not changed for the backdrop; the target, last in ``box``, is hidden."""
+        within = self._within(box.scaled(MARGIN))
+        self._take(self._mine | within, within)
 
     def outline(self, box: Box, posterior: Posterior) -> Outline | None:
         """The target's outline in the last picture.
@@ -144,7 +181,7 @@ class Backdrop:
         Returns:
             None where nothing moves there, or two have met who cannot be told apart.
         """
-        part = self._part(
+        part = self._within_picture(
             Box.from_center(box.cx, box.cy, box.width + ASIDE * box.height, HIGH * box.height)
         )
         known, differs = self._known[part], self._differs[part]
@@ -180,20 +217,80 @@ class Backdrop:
         columns = np.count_nonzero(told, axis=0)
         area = int(columns.sum())
         middle = columns @ np.arange(len(columns)) / max(area, 1) + 0.5
+        self._body = np.zeros_like(self._mine)
+        self._body[part] = told
+        whole = area > MOSTLY_TOLD * np.count_nonzero(body) and end.height > WHOLE * b.height
+        if whole or (not self._fill and area):
+            self._likely = float(posterior(self._last[part])[told].mean())
+            self._fill = area / b.area
+        self._share = area / max(1.0, self._fill * b.area)
         return Outline(
             end.moved(cols.start, rows.start),
             float(middle) + cols.start,
             area / int(np.count_nonzero(body)),
         )
 
+    def follow(self, box: Box, posterior: Posterior) -> Piece | None:
+        """What the target's piece has become in the last picture, or has come out as.
+
+        Args:
+            box: all of it, where it was last.
+            posterior: how likely each pixel of an image is the target's by its colour.
+
+        Returns:
+            None where there is no such piece, or somebody else is in it.
+        """
+        if not self._fill:
+            return None
+        areas, whole = self._pieces.areas, max(1.0, self._fill * box.area)
+        was = int(np.count_nonzero(self._was))
+        mine = self._pieces.overlap(self._was) > GOES_ON * np.minimum(areas, was)
+        if not mine.any():
+            about = self._within(box.scaled(COMES_OUT))
+            mine = self._pieces.overlap(self._appeared & about) > 0
+            if self._share > LEAPT:
+                larger = areas / whole
+                others = self._pieces.overlap(self._others) > OTHERS * areas
+                mine |= (np.maximum(larger, 1 / np.maximum(larger, 1e-9)) < AS_LARGE) & ~others
+            if not mine.any():
+                return None
+            largest = int(np.argmax(np.where(mine, areas, 0)))
+            mine = np.arange(len(areas)) == largest
+        body = self._pieces.mask(mine)
+        area = int(np.count_nonzero(body))
+        bounds = mask_box(body)
+        if bounds is None or np.count_nonzero(body & self._others) > OTHERS * area:
+            return None
+        part = self._within_picture(bounds)
+        likely = float(posterior(self._last[part])[body[part]].mean())
+        self._body, self._share = body, area / whole
+        return Piece(bounds, self._share, likely / self._likely)
+
     # -- parts ------------------------------------------------------------------------------------
 
-    def _part(self, box: Box) -> tuple[slice, slice]:
+    def _part_in_pieces(self, differs: Mask) -> None:
+        """Part what differs into pieces, and carry over whose these are."""
+        before = cv2.dilate(self._differs.astype(np.uint8), _ROUND) > 0
+        pieces = self._pieces = _pieces(differs)
+        self._differs = pieces.mask(np.ones(len(pieces.areas), np.bool_))
+        others = pieces.overlap(self._others) > OTHERS * pieces.areas
+        new = (pieces.overlap(before) == 0) & ~pieces.at_edge
+        self._appeared = pieces.mask((new | (pieces.overlap(self._appeared) > 0)) & ~others)
+        self._others = pieces.mask(others)
+        self._was, self._body = self._body, np.zeros_like(self._body)
+
+    def _take(self, mine: Mask, within: Mask) -> None:
+        self._same[within] = 0
+        still = (self._same >= STABLE) & ~mine
+        np.copyto(self._colors, self._last, where=still[:, :, None])
+        self._known |= still
+
+    def _within_picture(self, box: Box) -> tuple[slice, slice]:
         return part_in(self._last.shape, box)
 
     def _within(self, box: Box) -> Mask:
         mask = np.zeros(self._last.shape[:2], np.bool_)
-        mask[self._part(box)] = True
+        mask[self._within_picture(box)] = True
         return mask
 
     def _camera_moved(self, gray: Image, outside: Mask) -> bool:
@@ -221,6 +318,41 @@ class Backdrop:
         if not self._may_part:
             self._area = area
         return False
+
+
+@dataclass(frozen=True, slots=True)
+class _Pieces:
+    """The connected pieces of a mask, but for specks.
+
+    Attributes:
+        labels: ``(h, w)`` int32, of each pixel 0 or the number of its piece.
+        areas: ``(n,)`` pixels of each piece, 0 of what is none.
+        at_edge: ``(n,)`` whether it reaches the picture's edge.
+    """
+
+    labels: npt.NDArray[np.int32]
+    areas: npt.NDArray[np.int64]
+    at_edge: npt.NDArray[np.bool_]
+
+    def overlap(self, mask: Mask) -> npt.NDArray[np.int64]:
+        """Pixels of each piece in a mask, ``(n,)``."""
+        inside = np.bincount(self.labels[mask], minlength=len(self.areas))
+        return np.where(self.areas > 0, inside, 0)
+
+    def mask(self, those: Mask) -> Mask:
+        """Where the pieces chosen by ``those``, ``(n,)``, are."""
+        chosen: Mask = (those & (self.areas > 0))[self.labels]
+        return chosen
+
+
+def _pieces(mask: Mask) -> _Pieces:
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    left, top, width, height, areas = stats.T.astype(np.int64)
+    rows, cols = mask.shape
+    edge = (left == 0) | (top == 0) | (left + width == cols) | (top + height == rows)
+    areas = np.where(areas >= SPECK, areas, 0)
+    areas[0] = 0
+    return _Pieces(labels, areas, edge)
 
 
 def _ended(outline: Box, box: Box, known: Mask) -> Box:
