@@ -14,7 +14,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.ros.launching import CONFIG, declared, given, is_true
+from rgbd_kcf_tracker.ros.launching import CONFIG, a_file, declared, given, is_true
 
 ARGUMENTS = {
     'follow_file': (
@@ -33,8 +33,8 @@ ARGUMENTS = {
 def start(context: LaunchContext) -> list:
     """The nodes, once the arguments are known."""
     values = given(ARGUMENTS, context)
-    common = {'use_sim_time': is_true(values['use_sim_time'])}
-    namespace, file = values['namespace'], values['follow_file']
+    common = {'use_sim_time': is_true(values, 'use_sim_time')}
+    namespace, file = values['namespace'], a_file(values, 'follow_file')
     actions = [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(str(CONFIG.parent / 'launch' / 'tracker.launch.py')),
@@ -52,13 +52,13 @@ def start(context: LaunchContext) -> list:
                 {
                     **common,
                     'tracker': values['name'],
-                    'automatic': is_true(values['automatic']),
+                    'automatic': is_true(values, 'automatic'),
                 },
             ],
             output='screen',
         ),
     ]
-    if is_true(values['server']):
+    if is_true(values, 'server'):
         actions += [
             Node(
                 package='opennav_following',

@@ -8,53 +8,85 @@
 Every pair is processed, in lock-step unless told otherwise; the time is that of the recording.
 """
 
-from launch.actions import IncludeLaunchDescription, Shutdown
+from pathlib import Path
+
+from launch.actions import IncludeLaunchDescription, OpaqueFunction, Shutdown
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from launch import LaunchDescription
-from rgbd_kcf_tracker.ros.launching import CONFIG, declared
+from launch import LaunchContext, LaunchDescription
+from rgbd_kcf_tracker.live.camera_profiles import NO_CAMERA
+from rgbd_kcf_tracker.recordings.sequences import is_sequence_folder
+from rgbd_kcf_tracker.ros.launching import (
+    CAMERA,
+    CONFIG,
+    chosen_camera,
+    declared,
+    full_name,
+    given,
+    is_true,
+    number,
+)
 
 ARGUMENTS = {
     'bag': (None, 'The recording: .mcap, rosbag2 folder, ROS 1 .bag or sequence folder.'),
-    'camera': ('kinect2_qhd', 'Profile of config/cameras.yaml: what the recorded topics are.'),
-    'color_topic': ('', "Recorded colour topic, instead of the profile's."),
-    'depth_topic': ('', "Recorded depth topic, instead of the profile's."),
-    'info_topic': ('', "Recorded CameraInfo topic, instead of the profile's."),
+    **CAMERA,
+    'camera': (
+        '',
+        'Profile of config/cameras.yaml: what the recorded topics are; empty for kinect2_qhd, or '
+        'none where the recording is a folder of images.',
+    ),
     'init_box': ('', 'Target in the first image, x,y,width,height.'),
     'variant': ('', 'Which tracker; empty for the default.'),
     'params_file': (str(CONFIG / 'replayed.yaml'), 'Parameters of the tracker node.'),
+    'namespace': ('', 'Namespace of the tracker.'),
+    'name': ('tracker', 'Name of the tracker node.'),
     'rate': ('1.0', 'Speed, without lock-step.'),
     'loop': ('false', 'Begin again at the end.'),
     'lockstep': ('true', 'Wait for the answer to each frame.'),
 }
+TRACKER = (*CAMERA, 'init_box', 'variant', 'params_file', 'namespace', 'name')
 
 
-def generate_launch_description() -> LaunchDescription:
-    """Both nodes."""
-    passed = ('camera', 'color_topic', 'depth_topic', 'info_topic', 'init_box', 'variant')
+def start(context: LaunchContext) -> list:
+    """Both nodes, once the arguments are known."""
+    values = given(ARGUMENTS, context)
+    folder = is_sequence_folder(Path(values['bag']))
+    if not values['camera']:
+        values['camera'] = NO_CAMERA if folder else CAMERA['camera'][0]
+    _, remappings = chosen_camera(values)
+    topics = dict(remappings)
+    parameters = {
+        'bag': ParameterValue(values['bag'], value_type=str),
+        'rate': number(values, 'rate', float),
+        'loop': is_true(values, 'loop'),
+        'lockstep': is_true(values, 'lockstep'),
+        'answer_topic': f'{full_name(context, values)}/box',
+    }
+    if not folder:
+        # One camera of several that were recorded; a recording without it says so at once. Depth
+        # and CameraInfo of a profile are found beside the colour, where they were recorded.
+        named = {name: values[name] for name in ('depth_topic', 'info_topic')}
+        named['color_topic'] = topics.get('color/image', '')
+        parameters |= {name: topic for name, topic in named.items() if topic}
     tracker = IncludeLaunchDescription(
         PythonLaunchDescriptionSource(str(CONFIG.parent / 'launch' / 'tracker.launch.py')),
         launch_arguments=[
-            *((name, LaunchConfiguration(name)) for name in passed),
-            ('params_file', LaunchConfiguration('params_file')),
+            *((name, values[name]) for name in TRACKER),
             ('use_sim_time', 'true'),
         ],
     )
     replay = Node(
         package='rgbd_kcf_tracker',
         executable='replay',
-        parameters=[
-            {
-                'bag': ParameterValue(LaunchConfiguration('bag'), value_type=str),
-                'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
-                'loop': ParameterValue(LaunchConfiguration('loop'), value_type=bool),
-                'lockstep': ParameterValue(LaunchConfiguration('lockstep'), value_type=bool),
-            }
-        ],
+        parameters=[parameters],
         output='screen',
         on_exit=Shutdown(reason='the recording has ended'),
     )
-    return LaunchDescription([*declared(ARGUMENTS), tracker, replay])
+    return [tracker, replay]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """The arguments and both nodes."""
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=start)])

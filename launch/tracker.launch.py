@@ -15,7 +15,16 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
 from rgbd_kcf_tracker.live.settings import RAW
-from rgbd_kcf_tracker.ros.launching import CAMERA, CONFIG, chosen_camera, declared, given, is_true
+from rgbd_kcf_tracker.ros.launching import (
+    CAMERA,
+    CONFIG,
+    a_file,
+    chosen_camera,
+    declared,
+    full_name,
+    given,
+    is_true,
+)
 
 ARGUMENTS = {
     **CAMERA,
@@ -41,32 +50,33 @@ def start(context: LaunchContext) -> list:
     values = given(ARGUMENTS, context)
     profile, remappings = chosen_camera(values)
     parameters = {
-        'use_sim_time': is_true(values['use_sim_time']),
-        'autostart': is_true(values['autostart']),
+        'use_sim_time': is_true(values, 'use_sim_time'),
+        'autostart': is_true(values, 'autostart'),
     }
     # Raw is not said, so that a file of parameters may say otherwise.
-    transports = profile.transports(is_true(values['compressed']))
+    transports = profile.transports(is_true(values, 'compressed'))
     parameters |= {name: how for name, how in transports.items() if how != RAW}
     if values['variant']:
         parameters['variant'] = values['variant']
     if values['init_box']:
         parameters['init_box'] = ParameterValue(values['init_box'], value_type=str)
     if values['auto_init']:
-        parameters['auto_init'] = is_true(values['auto_init'])
+        parameters['auto_init'] = is_true(values, 'auto_init')
     actions = []
     if values['fastdds_profile']:
-        actions.append(
-            SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', values['fastdds_profile'])
-        )
+        dds = a_file(values, 'fastdds_profile')
+        actions.append(SetEnvironmentVariable('FASTRTPS_DEFAULT_PROFILES_FILE', dds))
+    # What rcl calls the node's logger.
+    logger = full_name(context, values)[1:].replace('/', '.')
     actions.append(
         Node(
             package='rgbd_kcf_tracker',
             executable='tracker',
             name=values['name'],
             namespace=values['namespace'],
-            parameters=[values['params_file'], parameters],
+            parameters=[a_file(values, 'params_file'), parameters],
             remappings=remappings,
-            arguments=['--ros-args', '--log-level', f'{values["name"]}:={values["log_level"]}'],
+            arguments=['--ros-args', '--log-level', f'{logger}:={values["log_level"]}'],
             output='screen',
         )
     )

@@ -12,7 +12,7 @@ from launch.actions import OpaqueFunction
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.ros.launching import CAMERA, chosen_camera, declared, given, is_true
+from rgbd_kcf_tracker.ros.launching import CAMERA, chosen_camera, declared, given, is_true, number
 
 ARGUMENTS = {
     **CAMERA,
@@ -30,10 +30,10 @@ def start(context: LaunchContext) -> list:
     parameters = {
         'tracker': values['tracker'],
         'host': values['host'],
-        'port': int(values['port']),
-        'rate': float(values['rate']),
+        'port': number(values, 'port', int),
+        'rate': number(values, 'rate', float),
     }
-    if is_true(values['compressed']):
+    if is_true(values, 'compressed'):
         parameters |= profile.transports(compressed=True)
     return [
         Node(

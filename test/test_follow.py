@@ -21,7 +21,7 @@ from typing import Any
 
 import pytest
 import yaml
-from test_launch import PROJECT, launch_modules  # noqa: F401  (a fixture)
+from test_launch import PROJECT, launch_modules, started  # noqa: F401  (a fixture)
 
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.live.following import Following, FollowParameters
@@ -89,13 +89,7 @@ def test_unasked_nothing_is_followed() -> None:
 
 
 def start_follow(**given: str) -> dict[str, Any]:
-    import runpy
-
-    found = runpy.run_path(str(PROJECT / 'launch' / 'follow.launch.py'))
-    defaults = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
-    assert not set(given) - set(defaults)
-    actions = found['start'](defaults | given)
-    assert found['generate_launch_description']() is not None
+    actions = started('follow.launch.py', **given)
     return {a.named.get('executable', type(a).__name__): a for a in actions}
 
 

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 import yaml
 
-from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.live.camera_profiles import CameraProfile, camera_profile, load_cameras
 from rgbd_kcf_tracker.live.settings import NodeParameters
 
@@ -35,7 +35,7 @@ class Remembered:
         self.values, self.named = values, named
 
     def perform(self, context: Any) -> str:
-        return context[self.values[0]]
+        return context.launch_configurations[self.values[0]]
 
 
 @pytest.fixture
@@ -67,15 +67,26 @@ def launch_modules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, 'rgbd_kcf_tracker.ros.launching', raising=False)
 
 
-def start_tracker(**given: str) -> tuple[Any, list[Any]]:
-    """The node that tracker.launch.py starts with these arguments, and all its actions."""
-    found = runpy.run_path(str(PROJECT / 'launch' / 'tracker.launch.py'))
-    unknown = set(given) - set(found['ARGUMENTS'])
+def started(file: str, **given: str) -> list[Any]:
+    """What a launch file starts with these arguments (and ``ros_namespace``, as pushed by one)."""
+    found = runpy.run_path(str(PROJECT / 'launch' / file))
+    unknown = set(given) - set(found['ARGUMENTS']) - {'ros_namespace'}
     assert not unknown
     defaults = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
-    actions = found['start'](defaults | given)
+    return found['start'](SimpleNamespace(launch_configurations=defaults | given))
+
+
+def start_tracker(**given: str) -> tuple[Any, list[Any]]:
+    """The node that tracker.launch.py starts with these arguments, and all its actions."""
+    actions = started('tracker.launch.py', **given)
     (node,) = (a for a in actions if type(a).__name__ == 'Node')
     return node, actions
+
+
+def start_replay(**given: str) -> tuple[dict[str, Any], dict[str, str]]:
+    """The parameters of replay.launch.py's replay node, and the arguments of its tracker."""
+    included, node = started('replay.launch.py', **given)
+    return node.named['parameters'][0], dict(included.named['launch_arguments'])
 
 
 @pytest.mark.parametrize('camera', list(load_cameras(CAMERAS)))
@@ -121,8 +132,46 @@ def test_arguments_reach_the_node(launch_modules: None) -> None:
     assert (node.named['namespace'], node.named['name']) == ('left', 'watcher')
     # The node itself sizes the transport to the machine: no variable stands in its way.
     assert len(actions) == 1
-    _, with_profile = start_tracker(fastdds_profile='/my.xml')
-    assert with_profile[0].values == ('FASTRTPS_DEFAULT_PROFILES_FILE', '/my.xml')
+    profile = str(PROJECT / 'config' / 'fastdds.xml')
+    _, with_profile = start_tracker(fastdds_profile=profile)
+    assert with_profile[0].values == ('FASTRTPS_DEFAULT_PROFILES_FILE', profile)
+
+
+@pytest.mark.parametrize(
+    ('namespace', 'outer', 'logger'),
+    [
+        ('', '', 'tracker'),
+        ('left', '', 'left.tracker'),
+        ('/left/eye', '', 'left.eye.tracker'),
+        ('left', '/robot', 'robot.left.tracker'),
+        ('/left', '/robot', 'left.tracker'),
+    ],
+)
+def test_the_log_level_is_that_of_the_node_in_its_namespace(
+    launch_modules: None, namespace: str, outer: str, logger: str
+) -> None:
+    node, _ = start_tracker(namespace=namespace, ros_namespace=outer, log_level='debug')
+    assert node.named['arguments'][-1] == f'{logger}:=debug'
+
+
+@pytest.mark.parametrize(
+    ('file', 'given', 'words'),
+    [
+        ('tracker', {'params_file': 'none.yaml'}, "params_file is 'none.yaml': there is no such"),
+        ('tracker', {'fastdds_profile': 'none.xml'}, "fastdds_profile is 'none.xml': there is no"),
+        ('tracker', {'auto_init': 'ja'}, "auto_init is 'ja': give true or false"),
+        ('tracker', {'compressed': 'ture'}, "compressed is 'ture': give true or false"),
+        ('replay', {'bag': 'a.mcap', 'rate': 'x'}, "rate is 'x': give a number"),
+        ('viewer', {'port': '80.5'}, "port is '80.5': give a number"),
+        ('follow', {'follow_file': 'none.yaml'}, "follow_file is 'none.yaml': there is no such"),
+        ('follow', {'automatic': 'flase'}, "automatic is 'flase': give true or false"),
+    ],
+)
+def test_a_mistyped_argument_starts_nothing(
+    launch_modules: None, file: str, given: dict[str, str], words: str
+) -> None:
+    with pytest.raises(RgbdKcfError, match=f'launch argument {words}'):
+        started(f'{file}.launch.py', **given)
 
 
 def test_a_profile_may_say_how_its_images_arrive(launch_modules: None, tmp_path: Path) -> None:
@@ -146,8 +195,8 @@ def test_what_the_shipped_file_documents_is_taken(tmp_path: Path) -> None:
 
 
 def test_arguments_are_declared_with_their_meaning(launch_modules: None) -> None:
-    for file in ('tracker.launch.py', 'replay.launch.py', 'viewer.launch.py'):
-        found = runpy.run_path(str(PROJECT / 'launch' / file))
+    for file in ('tracker', 'replay', 'viewer', 'follow'):
+        found = runpy.run_path(str(PROJECT / 'launch' / f'{file}.launch.py'))
         (entities,) = found['generate_launch_description']().values
         declared = [e for e in entities if type(e).__name__ == 'DeclareLaunchArgument']
         assert [d.values[0] for d in declared] == list(found['ARGUMENTS'])
@@ -157,10 +206,8 @@ def test_arguments_are_declared_with_their_meaning(launch_modules: None) -> None
 def test_the_viewer_looks_at_the_camera_of_the_tracker(launch_modules: None) -> None:
     from rgbd_kcf_tracker.view.live_page import ViewerParameters
 
-    found = runpy.run_path(str(PROJECT / 'launch' / 'viewer.launch.py'))
-    defaults = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
     given = {'camera': 'orbbec', 'compressed': 'true', 'port': '9000', 'info_topic': '/my/info'}
-    (node,) = found['start'](defaults | given)
+    (node,) = started('viewer.launch.py', **given)
     tracker, _ = start_tracker(camera='orbbec', compressed='true', info_topic='/my/info')
     assert node.named['remappings'] == tracker.named['remappings']
     (parameters,) = node.named['parameters']
@@ -172,18 +219,35 @@ def test_the_viewer_looks_at_the_camera_of_the_tracker(launch_modules: None) -> 
 
 def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None:
     tracker = runpy.run_path(str(PROJECT / 'launch' / 'tracker.launch.py'))
-    replay = runpy.run_path(str(PROJECT / 'launch' / 'replay.launch.py'))
-    (entities,) = replay['generate_launch_description']().values
-    (included,) = (e for e in entities if type(e).__name__ == 'IncludeLaunchDescription')
-    passed = {name for name, _ in included.named['launch_arguments']}
-    assert passed <= set(tracker['ARGUMENTS'])
-    (node,) = (e for e in entities if type(e).__name__ == 'Node')
+    parameters, passed = start_replay(bag='walk.mcap', depth_topic='/my/depth')
+    assert set(passed) <= set(tracker['ARGUMENTS'])
     from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 
-    names = set(ReplayParameters.__dataclass_fields__)
-    assert set(node.named['parameters'][0]) <= names
+    assert set(parameters) <= set(ReplayParameters.__dataclass_fields__)
     settings = yaml.safe_load((PROJECT / 'config' / 'replayed.yaml').read_text(encoding='utf-8'))
     NodeParameters(**settings['/**']['ros__parameters'])
+
+
+def test_replay_plays_the_camera_that_the_tracker_hears(
+    launch_modules: None, tmp_path: Path
+) -> None:
+    """One of several in the recording, in lock-step with a tracker in a namespace."""
+    parameters, passed = start_replay(bag='walk.mcap', camera='kinect2_hd', namespace='left')
+    hd = load_cameras(CAMERAS)['kinect2_hd']
+    assert (parameters['color_topic'], parameters['answer_topic']) == (
+        hd.color, '/left/tracker/box',
+    )  # fmt: skip
+    # Colour alone, and recordings without CameraInfo, are replayed too.
+    assert not {'depth_topic', 'info_topic'} & set(parameters)
+    assert (passed['camera'], passed['namespace']) == ('kinect2_hd', 'left')
+    named, _ = start_replay(bag='walk.mcap', color_topic='/c', depth_topic='/d', info_topic='/i')
+    assert [named[f'{kind}_topic'] for kind in ('color', 'depth', 'info')] == ['/c', '/d', '/i']
+    # A folder of images is played on the names that the tracker has by itself.
+    (tmp_path / 'rgb').mkdir()
+    parameters, passed = start_replay(bag=str(tmp_path))
+    assert 'color_topic' not in parameters
+    assert passed['camera'] == 'none'
+    assert start_replay(bag='walk.mcap')[1]['camera'] == 'kinect2_qhd'
 
 
 @pytest.mark.parametrize(

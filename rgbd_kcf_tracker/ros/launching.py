@@ -7,14 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ament_index_python.packages import get_package_share_directory
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 
+from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.live.camera_profiles import CameraProfile, camera_profile, load_cameras
 
+N = TypeVar('N', int, float)
 CONFIG = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config')
 Arguments = Mapping[str, 'tuple[str | None, str]']
 """Default and description of each argument; None: it must be given."""
@@ -62,6 +64,48 @@ def chosen_camera(values: Mapping[str, str]) -> tuple[CameraProfile, list[tuple[
     return profile, list(remappings.items())
 
 
-def is_true(text: str) -> bool:
-    """Whether an argument says yes."""
-    return text.strip().lower() in ('true', '1', 'yes', 'on')
+def is_true(values: Mapping[str, str], name: str) -> bool:
+    """Whether an argument says yes.
+
+    Raises:
+        ParameterError: where it says neither yes nor no.
+    """
+    word = values[name].strip().lower()
+    if word in ('true', '1', 'yes', 'on'):
+        return True
+    if word in ('false', '0', 'no', 'off'):
+        return False
+    raise ParameterError(f'launch argument {name} is {values[name]!r}: give true or false')
+
+
+def number(values: Mapping[str, str], name: str, kind: type[N]) -> N:
+    """The number that an argument gives, ``kind`` being int or float.
+
+    Raises:
+        ParameterError: where it is none.
+    """
+    try:
+        return kind(values[name])
+    except ValueError:
+        raise ParameterError(
+            f'launch argument {name} is {values[name]!r}: give a number ({kind.__name__})'
+        ) from None
+
+
+def a_file(values: Mapping[str, str], name: str) -> str:
+    """The file that an argument names; launch itself would go on without one that is not there.
+
+    Raises:
+        ParameterError: where there is no such file.
+    """
+    if not Path(values[name]).is_file():
+        raise ParameterError(f'launch argument {name} is {values[name]!r}: there is no such file')
+    return values[name]
+
+
+def full_name(context: Any, values: Mapping[str, str]) -> str:
+    """The name of a node with its namespaces, also those that a launch file around it pushes."""
+    outer = context.launch_configurations.get('ros_namespace', '')
+    namespace = values['namespace']
+    inside = namespace if namespace.startswith('/') else f'{outer}/{namespace}'
+    return '/' + '/'.join(part for part in (*inside.split('/'), values['name']) if part)
