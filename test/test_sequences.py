@@ -136,6 +136,13 @@ def test_depth_by_name_and_missing_depth(tmp_path: Path) -> None:
         open_recording(tmp_path)
 
 
+@pytest.mark.parametrize('kind', ['color', 'depth', 'info'])
+def test_a_folder_has_no_topic_that_could_be_named(tmp_path: Path, kind: str) -> None:
+    options = ReadOptions(**{f'{kind}_topic': '/mine'})
+    with pytest.raises(RecordingError, match=f'without topics: leave --{kind}-topic /mine out'):
+        open_recording(folder(tmp_path), options)
+
+
 def test_bad_images_are_named(tmp_path: Path) -> None:
     folder(tmp_path)
     (tmp_path / 'depth' / '000002.png').write_bytes(b'\x89PNG\r\n\x1a\nrubbish')

@@ -153,8 +153,9 @@ def test_named_topics() -> None:
 
 
 def test_nothing_that_fits_lists_the_topics() -> None:
+    # Depth that was announced and never came is no colour alone.
     with pytest.raises(RecordingError, match=r'no depth topic.*none to read colour alone.*/a '):
-        choose('/a', '')
+        choose('/a', '', '/depth/camera_info')
     with pytest.raises(RecordingError, match=r'no colour topic.*--color-topic.*/d '):
         choose('', '/d')
 
@@ -163,7 +164,10 @@ def test_colour_alone_when_asked() -> None:
     assert choose('/a', '', depth='none') == ChosenTopics('/a', None, None)
     assert choose('/a', '/d', depth='none').depth is None
     both = '/kinect2/qhd/image_color /kinect2/qhd/image_color_rect'
-    assert choose(both, '', depth='none').color == '/kinect2/qhd/image_color_rect'
+    for depth in ('none', None):  # not asked for: where no depth was recorded
+        chosen = choose(both, '', '/kinect2/qhd/camera_info', depth=depth)
+        assert (chosen.color, chosen.depth) == ('/kinect2/qhd/image_color_rect', None)
+        assert chosen.info == '/kinect2/qhd/camera_info'
     with pytest.raises(RecordingError, match='2 colour topics'):
         choose('/a /b', '', depth='none')
 

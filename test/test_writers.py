@@ -32,6 +32,7 @@ from rgbd_kcf_tracker.recordings import (
     KINECT2_HD,
     KINECT2_SD,
     BagWriter,
+    ReadOptions,
     TrackCsvWriter,
     VideoWriter,
     draw_track,
@@ -288,8 +289,11 @@ def test_colour_alone_is_written_and_read(tmp_path: Path) -> None:
     frame = Frame(make_frames(1)[0].color, None, 5)
     with BagWriter(tmp_path / 'a.mcap') as writer:
         writer.write_frame(frame)
-    with pytest.raises(RecordingError, match='no depth topic'):
-        open_recording(tmp_path / 'a.mcap')
+    with open_recording(tmp_path / 'a.mcap') as recording:
+        assert_same_frames(list(recording.frames()), [frame])
+        assert recording.warnings == ['no depth was recorded: read as colour alone']
+    with open_recording(tmp_path / 'a.mcap', ReadOptions(depth_topic='none')) as recording:
+        assert recording.warnings == []  # asked for
 
 
 def test_choices_are_checked(tmp_path: Path) -> None:

@@ -170,6 +170,9 @@ class _BagMessages:
             self._bag = RawBag(path)
         else:
             self._bag = self._recording.bag
+            if self._recording.topics.depth is None and options.depth_topic is None:
+                told = set(self._bag.warnings)
+                self.warnings += [w for w in self._recording.warnings if w not in told]
             self.color_topic = self._recording.topics.color
             self.depth_topic = self._recording.topics.depth
             self.info_topic = self._recording.topics.info

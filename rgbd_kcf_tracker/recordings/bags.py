@@ -33,7 +33,7 @@ from rgbd_kcf_tracker.recordings.images import (
 )
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
-from rgbd_kcf_tracker.recordings.recording import Closing, ReadOptions, RecordingInfo
+from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions, RecordingInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
 from rgbd_kcf_tracker.recordings.topics import ChosenTopics, base_name, choose_topics
@@ -55,6 +55,8 @@ class BagRecording(Closing):
         try:
             self._images = look_at_images(self.bag)
             self.topics = self._choose(options)
+            if self.topics.depth is None and options.depth_topic != NO_DEPTH:
+                self.warnings.append('no depth was recorded: read as colour alone')
             self._color = self.bag.topics[self.topics.color]
             self._depth = None if self.topics.depth is None else self.bag.topics[self.topics.depth]
             self._pairs, told = pair_topics(self._color, self._depth, options.tolerance_s)

@@ -44,6 +44,17 @@ def is_sequence_folder(path: Path) -> bool:
     return any((path / name).is_dir() for name in COLOR_FOLDERS)
 
 
+def _refuse_topics(path: Path, options: ReadOptions) -> None:
+    depth = None if options.depth_topic == NO_DEPTH else options.depth_topic
+    named = {'color': options.color_topic, 'depth': depth, 'info': options.info_topic}
+    for kind, topic in named.items():
+        if topic is not None:
+            raise RecordingError(
+                f'{path} is a folder of images, without topics: leave --{kind}-topic {topic} out '
+                '(its camera is in intrinsics.json or camera_info.json, or given as --intrinsics)'
+            )
+
+
 class SequenceFolder(Closing):
     """A :class:`Recording` of a folder with ``rgb/``.
 
@@ -60,6 +71,7 @@ class SequenceFolder(Closing):
         self.path = path
         self.name = path.resolve().name
         self.warnings: list[str] = []
+        _refuse_topics(path, options)
         self._color_folder = next(path / n for n in COLOR_FOLDERS if (path / n).is_dir())
         colors = image_files(self._color_folder)
         self._files = ImageFrames(

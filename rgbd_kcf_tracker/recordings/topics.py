@@ -118,14 +118,15 @@ def choose_topics(
         described: every topic of the bag with a few words, for errors.
         where: the bag, for errors.
         color: name of the colour topic, None to find it.
-        depth: name of the depth topic, None to find it, 'none' for colour alone.
+        depth: name of the depth topic, None to find it, 'none' for colour alone; None is that, too,
+            where nothing was recorded that may be depth.
         info: name of the CameraInfo topic, None to find it.
 
     Raises:
         RecordingError: where a named topic is not there, nothing fits, or more than one thing does.
     """
     finder = _Finder(images, described, where)
-    if depth == NO_DEPTH:
+    if depth == NO_DEPTH or (depth is None and finder.has_no_depth()):
         chosen_color = finder.named(color, 'color') if color else finder.only_color()
         chosen_depth = None
     else:
@@ -177,6 +178,12 @@ class _Finder:
         raise RecordingError(
             f'{self.where} has no {word} topic (a sensor_msgs/Image or CompressedImage with '
             f'messages): name one with --{option}-topic{extra}. {self.listing()}'
+        )
+
+    def has_no_depth(self) -> bool:
+        """Whether no topic holds depth, or is called so and holds nothing or what is not read."""
+        return all(i.role != 'depth' for i in self.images.values()) and not any(
+            'depth' in name.lower() for name in self.described
         )
 
     def only_color(self) -> str:
