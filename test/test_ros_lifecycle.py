@@ -238,6 +238,16 @@ def test_integers_for_doubles_and_lists_for_boxes_are_taken(rig: Rig) -> None:
     with running_node(rig, queue_policy='all', kcf__padding=2, init_box=[1, 2, 3, 4]) as node:
         assert node.get_parameter('kcf.padding').value == 2.0
         assert node.get_parameter('init_box').value == '1,2,3,4'
+        # While it runs, too; and what is wrong with them is not their type.
+        for name, value, reason in (
+            ('kcf.padding', 3, ''),
+            ('init_box', [5, 6, 7, 8], ''),
+            ('kcf.padding', 11, 'out of range'),
+            ('init_box', [1, 2, 3], "'1,2,3' is not four numbers"),
+        ):
+            (result,) = node.set_parameters([Parameter(name, value=value)])
+            assert (result.successful, reason in result.reason) == (not reason, True)
+        assert node.get_parameter('kcf.padding').value == 3.0
 
 
 def test_generated_files_are_up_to_date() -> None:

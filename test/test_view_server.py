@@ -360,7 +360,7 @@ def test_the_same_trouble_is_told_once(server: Server, caplog: pytest.LogCapture
 
 def test_other_addresses_need_a_token_that_is_long_enough(stub: Stub) -> None:
     for host in ('0.0.0.0', '192.168.1.5', '::', 'robot.local'):
-        with pytest.raises(ParameterError, match='ssh -L'):
+        with pytest.raises(ParameterError, match=r'a token in RGBD_KCF_TOKEN.*ssh -L'):
             Server(stub, host=host)
     with pytest.raises(ParameterError, match='too short'):
         Server(stub, host='0.0.0.0', token='1234')

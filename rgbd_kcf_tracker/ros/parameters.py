@@ -10,7 +10,6 @@ is wrong with what a node was started with is said in one error.
 
 from __future__ import annotations
 
-import contextlib
 import difflib
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -117,14 +116,16 @@ class ParameterServer:
         }
 
     def _before_set(self, parameters: Sequence[Parameter]) -> list[Parameter]:
-        """Take an integer for a double and a list for a box, before rclpy compares the types."""
+        """Take an integer for a double and a list for a box, before rclpy compares the types.
+
+        What it then is, in range or not, is refused with its reason: by _on_set, or by rclpy.
+        """
         taken = []
         for given in parameters:
             info = self._infos.get(given.name)
-            if info is not None:
-                # What cannot be taken is refused in _on_set with its reason, or by rclpy.
-                with contextlib.suppress(ParameterError):
-                    given = Parameter(given.name, value=coerced(info, given.value))
+            value = given.value if info is None else _of_type(info, given.value)
+            if value is not given.value:
+                given = Parameter(given.name, value=value)
             taken.append(given)
         return taken
 
@@ -151,13 +152,19 @@ def coerced(info: ParameterInfo, value: object) -> Scalar:
     Raises:
         ParameterError: where it is no such value or out of range.
     """
-    # Both name several things: ROS users write them as lists, too.
-    if info.name in ('init_box', 'topics') and not isinstance(value, str):
-        value = ','.join(map(str, value)) if isinstance(value, Iterable) else value
-    value = checked(info, value)
+    taken = checked(info, _of_type(info, value))
     if info.name == 'init_box':
-        parse_box(str(value))
-    return value
+        parse_box(str(taken))
+    return taken
+
+
+def _of_type(info: ParameterInfo, value: Any) -> Any:
+    """``value`` where it has another type that ROS users write for the parameter's."""
+    # Both name several things: as lists, too.
+    if info.name in ('init_box', 'topics') and not isinstance(value, str):
+        return ','.join(map(str, value)) if isinstance(value, Iterable) else value
+    is_integer = isinstance(value, int) and not isinstance(value, bool)
+    return float(value) if info.type is float and is_integer else value
 
 
 def descriptor(info: ParameterInfo) -> ParameterDescriptor:

@@ -27,6 +27,7 @@ from urllib.parse import SplitResult, urlsplit
 from aiohttp import WSMsgType, web
 
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.view import TOKEN_VARIABLE
 from rgbd_kcf_tracker.view.commands import LARGEST_MESSAGE, parse
 from rgbd_kcf_tracker.view.controller import Controller
 from rgbd_kcf_tracker.view.showing import pack
@@ -85,7 +86,8 @@ def check_access(host: str, token: str) -> None:
     """
     if not token and not is_loopback(host):
         raise ParameterError(
-            f'{host} is reachable from other machines: give a token (--token), or listen on '
+            f'{host} is reachable from other machines: give a token in '
+            f'{TOKEN_VARIABLE}, or listen on '
             '127.0.0.1 and reach it through an SSH tunnel (ssh -L 8080:127.0.0.1:8080 HOST)'
         )
     if token and len(token) < SHORTEST_TOKEN:
