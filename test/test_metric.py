@@ -332,6 +332,46 @@ def test_what_shows_behind_a_target_that_has_gone_is_not_the_target():
         assert track.box is None
 
 
+def test_a_thing_in_a_hand_is_found_again_where_it_was_carried_to():
+    """It is no figure there, but stands before the room; what is a part of the room is not it."""
+    pattern = np.kron([[0, 1, 0, 1], [1, 0, 1, 1], [0, 0, 1, 0]], np.ones((7, 6))) > 0
+    look = np.where(pattern[..., None], (40, 220, 240), (200, 40, 200)).astype(np.uint8)
+    room = Box(20, 20, 24, 21)
+
+    def picture(step: int, x: float, thing: bool, on_wall: bool) -> tuple[Frame, Box]:
+        carrier = Someone(x, 2.0, RED, BLACK)
+        box = Box(round(carrier.box.cx) + 8, 66, 24, 21)
+        color, depth = images([carrier])
+        for there, shown in ((box, thing), (room, on_wall)):
+            rows, cols = (
+                slice(int(there.y), int(there.bottom)),
+                slice(int(there.x), int(there.right)),
+            )
+            if shown:
+                color[rows, cols] = look
+        if thing:
+            depth[int(box.y) : int(box.bottom), int(box.x) : int(box.right)] = 1.95
+        return Frame(color, depth, step * 10**8, CAMERA), box
+
+    for carried in (True, False):
+        tracker = create_tracker('metric')
+        for step in range(6):
+            frame, box = picture(step, -0.4, True, False)
+            track = tracker.start(frame, box) if step == 0 else tracker.update(frame)
+        assert track.box is not None
+        assert track.box.iou(box) > 0.7
+        for step in range(6, 10):
+            assert tracker.update(picture(step, -0.2 * (9 - step), False, False)[0]).box is None
+        for step in range(10, 14):
+            frame, box = picture(step, 0.6, carried, not carried)
+            track = tracker.update(frame)
+        if carried:
+            assert track.box is not None
+            assert track.box.iou(box) > 0.6
+        else:
+            assert track.box is None
+
+
 def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():
     """Chosen while both were one figure; later an arm joins them, though both are known by then."""
     sequence = simulate('lookaround', seed=41, rate_hz=10, size=(640, 480))

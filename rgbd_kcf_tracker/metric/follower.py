@@ -469,13 +469,20 @@ class Follower:
         return owner.first_seen <= self._since and owner.number not in self._about
 
     def _far(self, account: Account, look: Look) -> bool:
-        """Whether a box elsewhere than the target was is no figure, though depth tells of it."""
+        """Whether a box elsewhere than the target was is no figure, though depth tells of it.
+
+        What fits in the hands is no figure anywhere: carried, it is a part of one, and wherever it
+        is put down it stands before the room.
+        """
         box = look.box
         if self._carried or not account.settled or box.intersection(self._last_box) > 0:
             return False
-        depth = account.scene.view.depth[_part(account.scene, box)]
+        part = _part(account.scene, box)
+        depth = account.scene.view.depth[part]
         if np.count_nonzero(depth) < READ * depth.size:
             return False
+        if _area(account.scene.view, look) < SMALL:
+            return np.count_nonzero(account.scene.before[part]) < (1 - STANDING) * depth.size
         outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
@@ -633,6 +640,13 @@ def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] 
     width = box.width / view.step * depth / view.intrinsics.fx
     aside = np.abs(place) / depth * spread
     return place, np.hypot(LOOK_OFF + LOOK_OFF_SHARE * width, aside), width
+
+
+def _area(view: DepthView, look: Look) -> float:
+    """Square metres of what was found, seen from the camera; infinite where it has no reading."""
+    k = view.intrinsics
+    pixels = look.box.area / view.step**2
+    return math.inf if look.depth is None else pixels * look.depth**2 / (k.fx * k.fy)
 
 
 def _people_about(account: Account, box: Box) -> frozenset[int]:
