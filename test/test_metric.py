@@ -16,6 +16,7 @@ from people_rig import BLACK, CAMERA, COLS, DARK_RED, RED, ROWS, WALL, Someone, 
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.track import Track
@@ -370,6 +371,30 @@ def test_a_thing_in_a_hand_is_found_again_where_it_was_carried_to():
             assert track.box.iou(box) > 0.6
         else:
             assert track.box is None
+
+
+@pytest.mark.parametrize(('deep', 'seen'), [(1.95, True), (WALL, False)])
+def test_depth_tells_whether_what_looks_less_alike_is_still_the_target(
+    monkeypatch: pytest.MonkeyPatch, deep: float, seen: bool
+):
+    """A thing that turned in a hand was given up, though it was where it had been."""
+
+    def picture(step: int) -> tuple[Frame, Box]:
+        carrier = Someone(0.1 * step, 2.0, RED, BLACK)
+        box = Box(round(carrier.box.cx) + 8, 66, 24, 21)
+        color, depth = images([carrier])
+        rows, cols = slice(66, 87), slice(int(box.x), int(box.right))
+        color[rows, cols], depth[rows, cols] = (40, 220, 240), deep if step == 7 else 1.95
+        return Frame(color, depth, step * 10**8, CAMERA), box
+
+    tracker = create_tracker('metric')
+    tracker.start(*picture(0))
+    for step in range(1, 8):
+        frame, box = picture(step)
+        look = Look(box, 0.9 if step < 7 else 0.6, 0.5, deep if step == 7 else 1.95)
+        monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+        track = tracker.update(frame)
+        assert track.box == (box if step < 7 or seen else None)
 
 
 def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import ByLook, Look
+from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
@@ -145,6 +145,7 @@ class Follower:
         self._hidden_for = 0.0
         self._agreed = 0
         self._last_box, self._unseen = box, 0.0
+        self._last_depth: float | None = None
         self._size_of_image = frame.width, frame.height
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
@@ -408,8 +409,9 @@ class Follower:
                 self._stood.carried(account.scene.motion, dt)
         look, stood = self._look.step(frame, dt, turn), 0.0
         if look is not None and account is not None:
-            # Depth shows no such thing: a look that has become unlike is something else.
+            # Where depth does not show it either, a look that has become unlike is something else.
             unlike = look.ratio < self._parameters.seen_ratio
+            unlike = unlike and not self._goes_on(account, look)
             reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
             if unlike or any(refused(account, look) for refused in reasons):
                 self._look.refuse(frame, look)
@@ -424,6 +426,7 @@ class Follower:
                 self._stood.seen(place, sigma, dt)
                 stood = self._stood.log_odds(place, sigma)
             self._last_box, self._unseen, self._carried = look.box, 0.0, False
+            self._last_depth = look.depth
         else:
             self._unseen += dt
         # He came at some time since the frame before, that is in time where that was.
@@ -446,6 +449,15 @@ class Follower:
         if (frame.width, frame.height) != (width, height):
             self._last_box = self._last_box.stretched(frame.width / width, frame.height / height)
             self._size_of_image = frame.width, frame.height
+
+    def _goes_on(self, account: Account, look: Look) -> bool:
+        """Whether depth shows something as near as the target was a frame ago, before the room."""
+        if self._unseen > 0 or look.depth is None or self._last_depth is None:
+            return False
+        near = abs(look.depth / self._last_depth - 1) < SAME_DEPTH
+        before = account.scene.before[_part(account.scene, look.box)]
+        stands = np.count_nonzero(before) >= (1 - STANDING) * before.size > 0
+        return near and stands and look.box.intersection(self._last_box) > 0
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
