@@ -457,7 +457,7 @@ class Follower:
         near = abs(look.depth / self._last_depth - 1) < SAME_DEPTH
         before = account.scene.before[_part(account.scene, look.box)]
         stands = np.count_nonzero(before) >= (1 - STANDING) * before.size > 0
-        return near and stands and look.box.intersection(self._last_box) > 0
+        return bool(near and stands and look.box.intersection(self._last_box) > 0)
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
@@ -494,7 +494,7 @@ class Follower:
         if np.count_nonzero(depth) < READ * depth.size:
             return False
         if _area(account.scene.view, look) < SMALL:
-            return np.count_nonzero(account.scene.before[part]) < (1 - STANDING) * depth.size
+            return bool(np.count_nonzero(account.scene.before[part]) < (1 - STANDING) * depth.size)
         outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
