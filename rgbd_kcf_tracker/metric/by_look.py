@@ -170,7 +170,7 @@ class ByLook:
             return None
         small = self._small = _small(frame)
         if self._backdrop is not None:
-            self._backdrop.see(_averaged(frame), self._last_box.over(_step_of(frame)))
+            self._backdrop.see(_averaged(frame), self._last_box.over(_step_of(frame)), dt)
         if self._hidden:
             sighting = self._searched(frame, small, None)
             self._hidden = sighting.ratio < parameters.seen_ratio

@@ -37,6 +37,10 @@ by less than :data:`DIFFERS` in a frame is not learned."""
 STABLE = 2
 """Frames in a row without a change after which a pixel is the backdrop: at the pace of a walk none
 of somebody's clothes but the plainest stays alike for longer."""
+SETTLED = 1.0
+"""Seconds without a change after which what differs is the backdrop although no outline tells the
+target from it: it was taken for the backdrop while something passed. Of who walks, no clothes stay
+where they are for so long."""
 MARGIN = 1.15
 """Sides of the box, in units of the target's, inside which nothing is learned unless its outline is
 known: an arm or a foot sticks out by so much."""
@@ -64,6 +68,8 @@ WHOLE = 0.85
 """Times the filter's height from which an outline is all of the target, not a part that shows."""
 SPECK = 4
 """Pixels of a piece below which it is noise."""
+SLIVER = 0.03
+"""Share of an outline up to which a part that only what is not known joins to it is not of it."""
 GOES_ON = 0.3
 """Share of the smaller of two pieces in which both must lie for one to be what the other was a
 picture ago: of who walks at 10 Hz it is more than half."""
@@ -131,17 +137,19 @@ class Backdrop:
         self._differs = self._others = self._appeared = self._body = self._was = none
         self._pieces = _pieces(none)
         self._likely = self._share = self._fill = 0.0
+        self._told = False
         self._same = np.zeros(shape, np.uint8)
         self._area = self._may_part = 0
         self.met = False
         self._mine = self._within(box.scaled(MARGIN))
 
-    def see(self, image: Image, box: Box) -> None:
+    def see(self, image: Image, box: Box, dt: float) -> None:
         """Take the next picture.
 
         Args:
             image: ``(h, w, 3)`` uint8 BGR; of another size, all starts again.
             box: where the target last was.
+            dt: seconds since the last picture.
         """
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         self.met = False
@@ -155,7 +163,7 @@ class Backdrop:
         apart = cv2.absdiff(image, cv2.convertScaleAbs(self._colors)).max(axis=2)
         self._part_in_pieces(self._known & (apart > DIFFERS))
         # Until an outline tells the target from the rest, all that moves may be a part of it.
-        self._mine = self._differs | around
+        self._mine = (self._differs & (self._same * dt < SETTLED)) | around
         self._last, self._gray = image, gray
 
     def learn(self, box: Box) -> None:
@@ -185,13 +193,16 @@ class Backdrop:
             Box.from_center(box.cx, box.cy, box.width + ASIDE * box.height, HIGH * box.height)
         )
         known, differs = self._known[part], self._differs[part]
-        if not differs.any():
-            return None
         rows, cols = part
         b = box.moved(-cols.start, -rows.start)
         own, about = (part_in(known.shape, each) for each in (b, b.scaled(MARGIN)))
         body = differs.copy()
-        body[own] |= ~known[own] & (posterior(self._last[part][own]) > 0.5)
+        likely = posterior(self._last[part][own])
+        body[own] |= ~known[own] & (likely > 0.5)
+        if not self._told and body[own].any():
+            self._likely, self._fill = float(likely[body[own]].mean()), float(body[own].mean())
+        if not differs.any():
+            return None
         # What goes on behind what the target has covered is a piece of it.
         joined = body | ~known
         joined = cv2.morphologyEx(joined.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND)
@@ -204,6 +215,9 @@ class Backdrop:
         mine = (inside > 0.5 * areas) & (areas >= SPECK)
         mine[int(np.argmax(inside))] = True
         body &= mine[labels]
+        # A sliver beyond what is not known is what something that passed has left there.
+        parts = _pieces(cv2.morphologyEx(body.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND) > 0)
+        body &= parts.mask(parts.areas > SLIVER * np.count_nonzero(body))
         bounds = mask_box(body)
         if bounds is None:
             return None
@@ -219,8 +233,9 @@ class Backdrop:
         middle = columns @ np.arange(len(columns)) / max(area, 1) + 0.5
         self._body = np.zeros_like(self._mine)
         self._body[part] = told
-        whole = area > MOSTLY_TOLD * np.count_nonzero(body) and end.height > WHOLE * b.height
-        if whole or (not self._fill and area):
+        mostly = area > MOSTLY_TOLD * np.count_nonzero(body)
+        if mostly and WHOLE < end.height / b.height < 1 / WHOLE:
+            self._told = True
             self._likely = float(posterior(self._last[part])[told].mean())
             self._fill = area / b.area
         self._share = area / max(1.0, self._fill * b.area)
@@ -247,11 +262,12 @@ class Backdrop:
         mine = self._pieces.overlap(self._was) > GOES_ON * np.minimum(areas, was)
         if not mine.any():
             about = self._within(box.scaled(COMES_OUT))
-            mine = self._pieces.overlap(self._appeared & about) > 0
+            covered = cv2.dilate((~self._known & about).astype(np.uint8), _ROUND) > 0
+            mine = self._pieces.overlap(covered | (self._appeared & about)) > 0
             if self._share > LEAPT:
                 larger = areas / whole
-                others = self._pieces.overlap(self._others) > OTHERS * areas
-                mine |= (np.maximum(larger, 1 / np.maximum(larger, 1e-9)) < AS_LARGE) & ~others
+                mine |= np.maximum(larger, 1 / np.maximum(larger, 1e-9)) < AS_LARGE
+            mine &= self._pieces.overlap(self._others) <= OTHERS * areas
             if not mine.any():
                 return None
             largest = int(np.argmax(np.where(mine, areas, 0)))
