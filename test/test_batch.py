@@ -19,6 +19,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import rgbd_kcf_tracker
+from rgbd_kcf_tracker.batch import transport
 from rgbd_kcf_tracker.batch.content import MISSING, files_digest
 from rgbd_kcf_tracker.batch.environment import Environment, code_files, environment
 from rgbd_kcf_tracker.batch.loop import run_all
@@ -187,20 +188,23 @@ def make(folder: Path) -> str:
     return 'made'
 
 
-def test_files_come_back_with_those_that_vouch_last(tmp_path: Path):
+def test_files_come_back_with_those_that_vouch_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     written = []
 
     def write(path: Path, data: bytes) -> None:
         written.append((path.relative_to(tmp_path).as_posix(), data))
 
-    assert unpack(packed(make), tmp_path, write) == 'made'
+    monkeypatch.setattr(transport, 'write_atomically', write)
+    assert unpack(packed(make), tmp_path) == 'made'
     assert written == [('results/a.txt', b'data'), ('z.txt', b'more'), ('results/a.json', b'key')]
 
 
 @pytest.mark.parametrize('name', ['../a', '/etc/a', 'b/../../a'])
 def test_no_file_is_written_outside_of_the_folder(tmp_path: Path, name: str):
     with pytest.raises(ValueError, match='outside'):
-        unpack(Packed(None, ((name, b''),)), tmp_path, Path.write_bytes)
+        unpack(Packed(None, ((name, b''),)), tmp_path)
 
 
 # --- content

@@ -34,7 +34,8 @@ LAYERS = (
     ('variants',),
     ('targets',),
     ('insight',),
-    ('recordings', 'simulation', 'cameras', 'batch'),
+    ('recordings', 'simulation', 'cameras'),
+    ('batch',),
     ('live', 'evaluation'),
     ('ros', 'cli', 'view', 'bench'),
 )

@@ -18,6 +18,9 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
+
 MISSING = '-'
 """Instead of the digest of a file that cannot be read."""
 
@@ -109,10 +112,5 @@ class _Cache:
     def write(self, digest: str) -> None:
         if time.time_ns() - self._newest < _SETTLED_S * 1e9:
             return
-        temporary = self._path.with_name(f'.{self._path.name}.{os.getpid()}')
-        with contextlib.suppress(OSError):  # without a home, or on a full disk, nothing is kept
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_text(
-                json.dumps({'state': self._state, 'digest': digest}), encoding='utf-8'
-            )
-            temporary.replace(self._path)
+        with contextlib.suppress(RecordingError):  # no home, or a full disk: nothing is kept
+            write_atomically(self._path, json.dumps({'state': self._state, 'digest': digest}))

@@ -12,6 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Generic, TypeVar
 
+from rgbd_kcf_tracker.recordings.outputs import write_atomically
+
 R = TypeVar('R')
 
 LAST = '.json'
@@ -36,14 +38,15 @@ def packed(work: Callable[[Path], R]) -> Packed[R]:
         )
 
 
-def unpack(parcel: Packed[R], folder: Path, write: Callable[[Path, bytes], None]) -> R:
+def unpack(parcel: Packed[R], folder: Path) -> R:
     """Write the files into ``folder``, those that vouch for others last.
 
     Raises:
         ValueError: for a file that would lie outside of the folder.
+        RecordingError: where one cannot be written.
     """
     for name, data in sorted(parcel.files, key=lambda item: item[0].endswith(LAST)):
         if os.path.isabs(name) or '..' in name.split('/'):
             raise ValueError(f'{name!r} lies outside of the folder')
-        write(folder / name, data)
+        write_atomically(folder / name, data)
     return parcel.result

@@ -31,7 +31,6 @@ from rgbd_kcf_tracker.evaluation.contenders import variant
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.jobs import Failure, Job, RunOptions, run_job
 from rgbd_kcf_tracker.evaluation.table import Table
-from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +91,7 @@ def measure_processes(counts: Sequence[int], scenes: str, seconds: float) -> tup
                 if done.result is None:
                     raise RuntimeError(f'{done.item.sequence.name}: {done.error}')
                 brought = max(brought, sum(len(data) for _, data in done.result.files))
-                failures, memory = unpack(done.result, Path(folder), write_atomically)
+                failures, memory = unpack(done.result, Path(folder))
                 if failures:
                     raise RuntimeError(failures[0].reason)
                 peaks.append(memory.peak)
@@ -176,7 +175,7 @@ def _drain(jobs: Sequence[Idle], workers: Workers) -> None:
         for done in run_all(idle, jobs, workers):
             if done.result is None:
                 raise RuntimeError(f'{done.error}')
-            unpack(done.result, Path(folder), write_atomically)
+            unpack(done.result, Path(folder))
 
 
 def _timed(work: Callable[[], None]) -> tuple[float, float]:

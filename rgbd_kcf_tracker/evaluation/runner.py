@@ -24,7 +24,6 @@ from rgbd_kcf_tracker.evaluation.jobs import (
     is_done,
     run_job,
 )
-from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 MOST_TOGETHER = 8
 """Trackers that share the frames of a sequence in one job: each holds memory until its end."""
@@ -101,7 +100,7 @@ def run(
     jobs = _split(todo, chosen.slots(), options) if todo else []
     for done in run_all(run_job, jobs, chosen, _failed_part, stopped=stopped):
         if done.result is not None:
-            unpack(done.result, folder, write_atomically)
+            unpack(done.result, folder)
         failures.note(done)
         settled = len(done.item.contenders) - (len(done.rest.contenders) if done.rest else 0)
         report(settled, done.item.sequence.name, False)

@@ -10,6 +10,7 @@ import json
 import os
 from collections.abc import Mapping
 from io import FileIO
+from pathlib import Path
 from typing import Any, Protocol
 
 import cv2
@@ -21,11 +22,9 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, Sightings, mot_text
-from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write
+from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write, part_of
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, format_box
 
-# At the end of the name of an image that is being written.
-_PART = '.part'
 _FILES = (
     'rgb',
     'depth',
@@ -126,13 +125,12 @@ class SequenceWriter(FrameWriter):
         """
         name = f'{self._count + 1:06d}'
         sizes = {key: file.tell() for key, file in self._files.items()}
-        images = [f'rgb/{name}.{self._suffix}']
+        images: dict[str, Path] = {}
         try:
-            self._write_image(images[0], frame.color)
+            self._write_image(images, f'rgb/{name}.{self._suffix}', frame.color)
             if frame.depth is not None:
                 self._make('depth')
-                images.append(f'depth/{name}.png')
-                self._write_image(images[1], millimetres(frame.depth))
+                self._write_image(images, f'depth/{name}.png', millimetres(frame.depth))
             if self._count == 0 and frame.intrinsics is not None:
                 self._write_camera(frame, frame.intrinsics)
             self._write_line('groundtruth.txt', format_box(visible))
@@ -143,8 +141,8 @@ class SequenceWriter(FrameWriter):
                 self._write_people(people)
             # Last what makes it a frame, so that a kill leaves all of it or none.
             self._write_line('timestamps.txt', str(frame.stamp_ns))
-            for image in images:
-                self._show(image)
+            for image, part in images.items():
+                self._show(image, part)
         except BaseException:
             self._take_back(images, sizes)
             raise
@@ -197,19 +195,18 @@ class SequenceWriter(FrameWriter):
         )
         self._write('mot.txt', mot_text(rows))
 
-    def _show(self, name: str) -> None:
+    def _show(self, name: str, part: Path) -> None:
         try:
-            path = self.output.place / name
-            path.with_name(path.name + _PART).rename(path)
+            part.rename(self.output.place / name)
         except OSError as error:
             raise RecordingError(cannot_write(self.output.path / name, error)) from None
 
-    def _take_back(self, images: list[str], sizes: dict[str, int]) -> None:
+    def _take_back(self, images: dict[str, Path], sizes: dict[str, int]) -> None:
         """Leave no half of a frame."""
-        for image in images:
-            for end in ('', _PART):
+        for image, part in images.items():
+            for path in (self.output.place / image, part):
                 with contextlib.suppress(OSError):
-                    (self.output.place / f'{image}{end}').unlink()
+                    path.unlink()
         for key, file in self._files.items():
             with contextlib.suppress(OSError):
                 file.seek(file.truncate(sizes.get(key, 0)))
@@ -233,7 +230,8 @@ class SequenceWriter(FrameWriter):
         except OSError as error:
             raise RecordingError(cannot_write(self.output.path / name, error)) from None
 
-    def _write_image(self, name: str, image: npt.NDArray[Any]) -> None:
+    def _write_image(self, images: dict[str, Path], name: str, image: npt.NDArray[Any]) -> None:
+        images[name] = part = part_of(self.output.place / name)
         suffix = name[-4:]
         flags = (
             [int(cv2.IMWRITE_PNG_COMPRESSION), 1]
@@ -244,7 +242,6 @@ class SequenceWriter(FrameWriter):
         try:
             if not done:
                 raise OSError('image cannot be encoded')
-            with (self.output.place / f'{name}{_PART}').open('xb') as file:
-                file.write(data.tobytes())
+            part.write_bytes(data.tobytes())
         except OSError as error:
             raise RecordingError(cannot_write(self.output.path / name, error)) from None

@@ -26,7 +26,12 @@ from rgbd_kcf_tracker.errors import MissingExtraError, RecordingError
 from rgbd_kcf_tracker.extras import how_to_get
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile, check_outputs
+from rgbd_kcf_tracker.recordings.outputs import (
+    FrameWriter,
+    OutputFile,
+    check_outputs,
+    moved_into_place,
+)
 from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
 from rgbd_kcf_tracker.track import Track
 
@@ -145,33 +150,17 @@ class VideoWriter(FrameWriter):
         """The pieces as one, the index first; where that fails, they stay as they are."""
         if place.suffix.lower() == '.mkv':
             return
-        one = place.with_name(f'.{place.name}.{os.getpid()}{place.suffix}')
-        try:
-            done = subprocess.run(
-                [
-                    _ffmpeg(self.path),
-                    '-hide_banner',
-                    '-loglevel',
-                    'error',
-                    '-y',
-                    '-i',
-                    os.fspath(place),
-                    *_IN_ONE,
-                    os.fspath(one),
-                ],
+        failures = RecordingError, subprocess.CalledProcessError
+        with contextlib.suppress(*failures), moved_into_place(place) as one:
+            subprocess.run(
+                [_ffmpeg(self.path), *_QUIET, '-i', os.fspath(place), *_IN_ONE, os.fspath(one)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,
-                check=False,
+                check=True,
             )
-            if done.returncode == 0:
-                shutil.copymode(place, one)
-                one.replace(place)
-        except OSError:
-            pass
-        finally:
-            one.unlink(missing_ok=True)
+            shutil.copymode(place, one)
 
     def _start(self, width: int, height: int) -> subprocess.Popen[bytes]:
         # yuv420p wants even sides.
