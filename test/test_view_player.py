@@ -99,6 +99,19 @@ def assert_same(target: dict[str, Any], track: Track) -> None:
         assert target.get(shown) == (None if known is None else pytest.approx(known, abs=1e-3))
 
 
+def test_a_simulated_scene_makes_the_truth_that_is_asked_for() -> None:
+    scene, other = (SimulatedRecording('occlusion', 3, 15.0, SIZE, 1.0) for _ in range(2))
+    start, _ = first_box(scene, None)
+    assert set(scene._truths) == set(range(start + 1))
+    assert len(list(other.frames())) == len(scene)
+    for boxes, same in (
+        (scene.groundtruth, other.groundtruth),
+        (scene.groundtruth_body, other.groundtruth_body),
+    ):
+        assert boxes[:] == same[:]
+        assert boxes[0] is not None
+
+
 def test_seeking_shows_what_the_tracker_says_of_that_frame() -> None:
     rig = Rig()
     expected = tracked()

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -145,19 +145,27 @@ class Recording(Protocol):
     Attributes:
         name: short name, without folders and suffix.
         path: where it lies.
-        groundtruth: box of the visible part per frame, None where absent. The list may be shorter
-            than the recording: frames after its end are not annotated. None: no ground truth.
-        groundtruth_body: the same for the whole body, None where not given.
         intrinsics: of the colour camera, or None.
         warnings: what was odd, in whole sentences; grows while frames are read.
     """
 
     name: str
     path: Path
-    groundtruth: list[Box | None] | None
-    groundtruth_body: list[Box | None] | None
     intrinsics: Intrinsics | None
     warnings: list[str]
+
+    @property
+    def groundtruth(self) -> Sequence[Box | None] | None:
+        """Box of the visible part per frame, None where absent; None: no ground truth.
+
+        It may be shorter than the recording: frames after its end are not annotated.
+        """
+        ...
+
+    @property
+    def groundtruth_body(self) -> Sequence[Box | None] | None:
+        """The same for the whole body, None where not given."""
+        ...
 
     def __len__(self) -> int:
         """Number of frames."""

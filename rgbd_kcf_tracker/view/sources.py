@@ -5,15 +5,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import overload
 
 from rgbd_kcf_tracker.errors import BoxError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings import Recording, RecordingInfo
 from rgbd_kcf_tracker.recordings.recording import Closing
-from rgbd_kcf_tracker.simulation import SimulatedSequence, simulate
+from rgbd_kcf_tracker.simulation import SimulatedSequence, Truth, simulate
+
+
+class _Boxes(Sequence['Box | None']):
+    """A box of each frame, made when it is asked for: all of them together take seconds."""
+
+    def __init__(self, count: int, of: Callable[[int], Box | None]) -> None:
+        self._numbers, self._of = range(count), of
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> Box | None: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Box | None]: ...
+    def __getitem__(self, index: int | slice) -> Box | list[Box | None] | None:
+        numbers = self._numbers[index]
+        return self._of(numbers) if isinstance(numbers, int) else [self._of(n) for n in numbers]
 
 
 class SimulatedRecording(Closing):
@@ -43,9 +62,9 @@ class SimulatedRecording(Closing):
         self.path = Path(self.name)
         self.intrinsics: Intrinsics | None = self._sequence.intrinsics
         self.warnings: list[str] = []
-        truths = [self._sequence.truth(i) for i in range(len(self._sequence))]
-        self.groundtruth: list[Box | None] | None = [t.visible for t in truths]
-        self.groundtruth_body: list[Box | None] | None = [t.body for t in truths]
+        self._truths: dict[int, Truth] = {}
+        self.groundtruth = _Boxes(len(self), lambda index: self._truth(index).visible)
+        self.groundtruth_body = _Boxes(len(self), lambda index: self._truth(index).body)
 
     def __len__(self) -> int:
         return len(self._sequence)
@@ -53,7 +72,15 @@ class SimulatedRecording(Closing):
     def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
         """The frames from ``start`` up to and without ``end``, rendered as they are read."""
         stop = len(self) if end is None else min(end, len(self))
-        return (self._sequence[index].frame for index in range(start, stop))
+        for index in range(start, stop):
+            shown = self._sequence[index]
+            self._truths[index] = shown.truth
+            yield shown.frame
+
+    def _truth(self, index: int) -> Truth:
+        if index not in self._truths:
+            self._truths[index] = self._sequence.truth(index)
+        return self._truths[index]
 
     def info(self) -> RecordingInfo:
         """What is in the scene."""
@@ -87,8 +114,9 @@ def first_box(recording: Recording, given: Box | None, start: int = 0) -> tuple[
         )
     if given is not None:
         return start, given
-    for number, box in enumerate((recording.groundtruth or [])[start:], start=start):
-        if box is not None:
+    truth = recording.groundtruth or ()
+    for number in range(start, len(truth)):
+        if (box := truth[number]) is not None:
             return number, box
     raise BoxError(
         f'{recording.path} has no ground truth: give the target as --init X,Y,W,H '
