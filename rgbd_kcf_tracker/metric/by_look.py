@@ -116,6 +116,7 @@ class ByLook:
 
     Attributes:
         response: the filter's in the last look against its own recent mean.
+        last_box: where the target was found last, in pixels of the newest image.
     """
 
     def __init__(self, frame: Frame, box: Box, parameters: MetricParameters) -> None:
@@ -139,7 +140,7 @@ class ByLook:
         self._small = _small(frame)
         self._elsewhere.keep(self._small, box.over(_step_of(frame)))
         self._flow = TextureFlow()
-        self._last_box = box
+        self.last_box = box
         self._backdrop: Backdrop | None = None
         if self._depthless(frame):
             self._backdrop = Backdrop(_averaged(frame), box.over(_step_of(frame)))
@@ -170,7 +171,7 @@ class ByLook:
             return None
         small = self._small = _small(frame)
         if self._backdrop is not None:
-            self._backdrop.see(_averaged(frame), self._last_box.over(_step_of(frame)), dt)
+            self._backdrop.see(_averaged(frame), self.last_box.over(_step_of(frame)), dt)
         if self._hidden:
             sighting = self._searched(frame, small, None)
             self._hidden = sighting.ratio < parameters.seen_ratio
@@ -195,12 +196,12 @@ class ByLook:
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
+        self.last_box = look.box
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
         if not look.moved and (self._backdrop is None or not self._backdrop.met):
             self._believed(frame, look, dt)
-        self._last_box = look.box
         if self._backdrop is not None:
             self._backdrop.learn(look.box.over(_step_of(frame)))
         self._keep(frame)
@@ -271,7 +272,7 @@ class ByLook:
     def _lose(self, frame: Frame) -> None:
         self._flow.forget()
         if self._backdrop is not None:
-            self._backdrop.miss(self._last_box.over(_step_of(frame)))
+            self._backdrop.miss(self.last_box.over(_step_of(frame)))
 
     def _follow_size(self, frame: Frame) -> None:
         """Carry the target over to a stream whose image size has changed."""
@@ -283,7 +284,7 @@ class ByLook:
         self._flow.forget()
         self._elsewhere.forget()
         self._cx, self._cy = self._cx * across, self._cy * down
-        self._last_box = self._last_box.stretched(across, down)
+        self.last_box = self.last_box.stretched(across, down)
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
         self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
@@ -400,7 +401,7 @@ class ByLook:
         if outline is None:
             return look
         box = outline.box.over(1 / step)
-        change, apart = box.height / self._last_box.height, box.height / filtered.height
+        change, apart = box.height / self.last_box.height, box.height / filtered.height
         if max(change, 1 / change) > SAME_HEIGHT or max(apart, 1 / apart) > LIKE_FILTER:
             return look
         if outline.told > TOLD:

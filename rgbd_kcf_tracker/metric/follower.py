@@ -147,9 +147,8 @@ class Follower:
         self._account: Account | None = None
         self._hidden_for = 0.0
         self._agreed = 0
-        self._last_box, self._unseen = box, 0.0
+        self._unseen = 0.0
         self._last_depth: float | None = None
-        self._size_of_image = frame.width, frame.height
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
@@ -405,7 +404,6 @@ class Follower:
 
     def _by_look(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Track:
         assert self._look is not None
-        self._follow_size(frame)
         if account is not None:
             self._carried |= account.scene.motion is not None
             if self._stood is not None:
@@ -428,8 +426,8 @@ class Follower:
                     self._stood = Stood(place, sigma, width)
                 self._stood.seen(place, sigma, dt)
                 stood = self._stood.log_odds(place, sigma)
-            self._last_box, self._unseen, self._carried = look.box, 0.0, False
             self._last_depth = look.depth
+            self._unseen, self._carried = 0.0, False
         else:
             self._unseen += dt
         # He came at some time since the frame before, that is in time where that was.
@@ -446,12 +444,10 @@ class Follower:
             return self._hidden(frame, dt)
         return self._tracked(frame, look.box, _score(look, stood), look.depth)
 
-    def _follow_size(self, frame: Frame) -> None:
-        """Carry the last box over to a stream whose image size has changed."""
-        width, height = self._size_of_image
-        if (frame.width, frame.height) != (width, height):
-            self._last_box = self._last_box.stretched(frame.width / width, frame.height / height)
-            self._size_of_image = frame.width, frame.height
+    @property
+    def _last_box(self) -> Box:
+        assert self._look is not None
+        return self._look.last_box
 
     def _goes_on(self, account: Account, look: Look) -> bool:
         """Whether depth shows something as near as the target was a frame ago, before the room."""
