@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation import identity
 from rgbd_kcf_tracker.evaluation.datasets import Sample
 from rgbd_kcf_tracker.evaluation.datasets.base import Person
-from rgbd_kcf_tracker.evaluation.identity import Seen, View, Views, all_pairs, look, pair
+from rgbd_kcf_tracker.evaluation.identity import Seen, Sighting, Views, all_pairs, look, pair
 from rgbd_kcf_tracker.evaluation.metrics.separation import balanced_reliability, separation
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
@@ -84,7 +84,7 @@ def test_each_frame_is_shown_first_also_those_without_people():
 
 def seen(name: str, *views: tuple[int, float, int]) -> Seen:
     """Views of ``(person, seconds, look)``."""
-    made = tuple(View(who, i, round(s * 1e9), what) for i, (who, s, what) in enumerate(views))
+    made = tuple(Sighting(who, i, round(s * 1e9), what) for i, (who, s, what) in enumerate(views))
     return Seen(name, len(views), len(views), made)
 
 

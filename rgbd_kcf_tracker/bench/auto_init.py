@@ -44,7 +44,7 @@ from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
 from rgbd_kcf_tracker.simulation.solids import Lighting
 from rgbd_kcf_tracker.simulation.textures import Texture
 from rgbd_kcf_tracker.simulation.wardrobe import Wardrobe
-from rgbd_kcf_tracker.simulation.world import View, World
+from rgbd_kcf_tracker.simulation.world import Viewpoint, World
 
 RATE_HZ = 5.0
 """At which auto_init looks."""
@@ -225,7 +225,7 @@ def _print(rng: np.random.Generator, wide: float, high: float, camera: Intrinsic
     focal = 200 * 4.0
     lens = Intrinsics(focal, focal, cols / 2, rows - 0.05 * 200)
     sun = np.array([0.3, -0.8, -0.5])
-    view = View(lens, np.eye(3), np.zeros(3), Lighting(sun / np.linalg.norm(sun)))
+    view = Viewpoint(lens, np.eye(3), np.zeros(3), Lighting(sun / np.linalg.norm(sun)))
     layer = actor.draw(0.0, view, (0, 0, cols, rows), True)
     out: Texture = paper.copy()
     if layer is not None:

@@ -46,7 +46,8 @@ from std_srvs.srv import Trigger
 
 from rgbd_kcf_tracker.bench.rig import environment, resident_mb
 from rgbd_kcf_tracker.live.settings import READ_ONLY, all_parameters
-from rgbd_kcf_tracker.ros.messages import NANOSECONDS, image_message, stamp_from_ns, stamp_to_ns
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
+from rgbd_kcf_tracker.ros.messages import image_message, stamp_from_ns, stamp_to_ns
 
 NAMESPACE = '/rgbd_kcf_faults'
 TRACKER = f'{NAMESPACE}/tracker'

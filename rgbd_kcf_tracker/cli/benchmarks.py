@@ -15,12 +15,17 @@ from typing import TYPE_CHECKING
 
 from rgbd_kcf_tracker.cli.common import parse_intrinsics
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
-from rgbd_kcf_tracker.cli.workers import NOTICE, RECORD, Progress, open_workers, record
+from rgbd_kcf_tracker.cli.workers import (
+    EXIT_FAILURES,
+    NOTICE,
+    RECORD,
+    Progress,
+    open_workers,
+    record,
+)
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 
 DEFAULT_FPS = 30.0
-EXIT_FAILURES = 1
-"""Exit code where the report was written but some runs failed."""
 _BEFORE_RESULTS = {RECORD, 'failures.txt', 'per_frame.csv'}
 """What a report folder holds before the first result."""
 

@@ -18,6 +18,7 @@ from typing import Any
 
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
+    EXIT_FAILURES,
     NOTICE,
     RECORD,
     WORKER_OPTIONS,
@@ -29,9 +30,6 @@ from rgbd_kcf_tracker.cli.workers import (
 )
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.extras import require
-
-EXIT_FAILURES = 1
-"""Exit code where some recordings failed."""
 
 EPILOG = """\
 several recordings:

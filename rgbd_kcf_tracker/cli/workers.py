@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 RECORD = 'runs.jsonl'
 WORKER_OPTIONS = ('jobs', 'cluster', 'shard')
 NOTICE = 'the runs under way are finished, then it stops; Ctrl-C again stops at once'
+EXIT_FAILURES = 1
+"""Exit code where some runs failed, and what the others gave was written."""
 _LINE_EVERY_S = 30.0
 
 

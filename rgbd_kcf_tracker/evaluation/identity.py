@@ -55,7 +55,7 @@ class Views:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class Sighting:
     """A sighting that could be described."""
 
     person: int
@@ -78,7 +78,7 @@ class Seen:
     recording: str
     frames: int
     sightings: int
-    views: tuple[View, ...]
+    views: tuple[Sighting, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,8 +97,8 @@ class Pairs:
     name: str
     across: bool
     seen: tuple[Seen, ...]
-    left: tuple[View, ...]
-    right: tuple[View, ...]
+    left: tuple[Sighting, ...]
+    right: tuple[Sighting, ...]
     probability: Array
 
     @property
@@ -148,7 +148,7 @@ def look(recording: str, samples: Iterable[Sample], views: Views) -> Seen:
         samples: of a sequence of kind EVERYONE.
         views: how.
     """
-    found: list[View] = []
+    found: list[Sighting] = []
     count = frames = 0
     for number, sample in enumerate(samples):
         frames += 1
@@ -159,7 +159,7 @@ def look(recording: str, samples: Iterable[Sample], views: Views) -> Seen:
             count += 1
             what = views.describe(sample.frame, person.box)
             if what is not None:
-                found.append(View(person.id, number, sample.frame.stamp_ns, what))
+                found.append(Sighting(person.id, number, sample.frame.stamp_ns, what))
     return Seen(recording, frames, count, tuple(found))
 
 
@@ -211,7 +211,7 @@ def same_people(one: str, other: str) -> bool:
     return a is not None and b is not None and a[1] == b[1]
 
 
-def _spread(views: Sequence[View]) -> list[View]:
+def _spread(views: Sequence[Sighting]) -> list[Sighting]:
     """At most :data:`MOST_VIEWS` of each person, evenly spread."""
     kept = []
     for person in dict.fromkeys(v.person for v in views):

@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
 )
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import place_of
 from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
-from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, Truth, WithRestarts, run, trace
+from rgbd_kcf_tracker.evaluation.passes import Notes, OnePass, Thumbnails, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
     write_json,
@@ -187,7 +187,7 @@ def _run_sequence(job: Job) -> list[Failure]:
             passes[contender.name] = OnePass(contender.make())
             if options.short_term and opened.annotated:
                 restarts[contender.name] = WithRestarts(contender.make())
-    thumbnails, truth = Thumbnails(), Truth()
+    thumbnails, truth = Thumbnails(), Notes()
     samples = as_asked(from_first_view(opened.samples), sequence, options)
     run(samples, truth, thumbnails, *passes.values(), *restarts.values())
     stamps = truth.stamps_ns
@@ -266,7 +266,7 @@ def _meta(
     return meta
 
 
-def _places(tracks: list[Track], truth: Truth) -> list[tuple[float, ...]]:
+def _places(tracks: list[Track], truth: Notes) -> list[tuple[float, ...]]:
     """Places against the truth, from the second frame on."""
     found, astray = [], False
     for index in range(1, len(tracks)):

@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.evaluation.datasets import otb
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array as Boxes
 from rgbd_kcf_tracker.evaluation.metrics.boxes import as_array, center_error
 from rgbd_kcf_tracker.evaluation.metrics.otb import precision_at_20, precision_curve
-from rgbd_kcf_tracker.evaluation.passes import OnePass, Truth, run
+from rgbd_kcf_tracker.evaluation.passes import Notes, OnePass, run
 from rgbd_kcf_tracker.variants import create_tracker
 
 REFERENCE = 'KCF_GaussHog'
@@ -52,7 +52,7 @@ def boxes_of(folder: Path) -> tuple[Boxes, Boxes, Boxes]:
     """
     sequence = otb.find(folder, FPS)[0]
     opened = sequence.open()
-    truth, one = Truth(), OnePass(create_tracker('kcf'))
+    truth, one = Notes(), OnePass(create_tracker('kcf'))
     run(opened.samples, truth, one)
     one.check()
     path = folder / 'results' / f'{REFERENCE}.txt'

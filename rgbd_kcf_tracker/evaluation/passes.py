@@ -166,7 +166,7 @@ def _best_overlap(box: Box | None, visible: Box, body: Box | None) -> float:
 
 
 @dataclass(slots=True)
-class Truth:
+class Notes:
     """Notes what is true of the frames of a sequence, one entry per frame.
 
     Attributes:

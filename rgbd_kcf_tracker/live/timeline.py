@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.recordings.images import as_bytes
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
-NANOSECONDS = 1_000_000_000
 LARGEST_STEP_NS = 60 * NANOSECONDS
 """A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
 LEAST_STEP_NS = 1_000_000

@@ -24,8 +24,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere, Image
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
-from rgbd_kcf_tracker.metric.identity.scale_filter import STEP as SCALE_STEP
-from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
+from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
 from rgbd_kcf_tracker.metric.perceive.colors import view_image

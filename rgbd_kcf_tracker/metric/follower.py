@@ -48,7 +48,7 @@ ABOUT = 1.5
 """Times its size that the surroundings of a box are in which depth is read of what has none."""
 EVEN = 0.5
 """Probability from which a box is shown as the target's alone."""
-SURE = 0.6
+LEARNED = 0.6
 """Score from which a target's look is learned from where it was found: below, it may well be
 somebody else, who would be the target from then on."""
 ATTEND = 1.0
@@ -74,7 +74,7 @@ sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the di
 DISOWNED = 0.25
 """Probability that who came back is the target, below which he is somebody else after all: 3 to 1,
 as he was taken once already, on more than this."""
-STANDING = 0.6
+IS_ROOM = 0.6
 """Share of a box's middle that shows the room from which it is taken to be no more than that: of a
 thin target's box up to half shows what is behind."""
 NEWCOMER = 1.5
@@ -163,7 +163,7 @@ class Follower:
         self.response: float | None = None
         if account is not None:
             self._lock(frame, account, box)
-            self._mobile = account.settled and _room_share(account, box) < 1 - STANDING
+            self._mobile = account.settled and _room_share(account, box) < 1 - IS_ROOM
             self._about = _people_about(account, box)
             self._ends = _ends(box, account.scene)
         self._look: ByLook | None = None
@@ -290,10 +290,10 @@ class Follower:
         self.seen = found.seen
         outline = BySurface.outline(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
-        if self.person is not None and score >= SURE:
+        if self.person is not None and score >= LEARNED:
             for cue in self._cues:
                 cue.learn(frame, box, self.person.number)
-        if self._look is not None and not found.seen.cut.any and score >= SURE:
+        if self._look is not None and not found.seen.cut.any and score >= LEARNED:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, score, found.seen.depth, surface.belief())
 
@@ -397,7 +397,7 @@ class Follower:
             return False
         scene = account.scene
         return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
-            self.person is not None and self.person.mobile and _room_share(account, box) > STANDING
+            self.person is not None and self.person.mobile and _room_share(account, box) > IS_ROOM
         )
 
     # -- by look ----------------------------------------------------------------------------------
@@ -468,7 +468,7 @@ class Follower:
 
     def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
-        return self._mobile and _room_share(account, look.box) > STANDING
+        return self._mobile and _room_share(account, look.box) > IS_ROOM
 
     def _taken(self, account: Account, look: Look) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""

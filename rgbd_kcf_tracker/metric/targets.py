@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.metric.by_surface import Candidate
 from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.follower import SURE, Follower
+from rgbd_kcf_tracker.metric.follower import LEARNED, Follower
 from rgbd_kcf_tracker.metric.identity.middle import (
     in_metres,
     row_by_row,
@@ -198,7 +198,7 @@ class MetricTargets:
         unsure = {
             f.person.number
             for f in self._followers.values()
-            if f.person is not None and f.track.score < SURE
+            if f.person is not None and f.track.score < LEARNED
         }
         self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()

@@ -12,8 +12,8 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections import OrderedDict
 from collections.abc import Iterator
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 
@@ -23,14 +23,13 @@ from mcap.records import Channel, Schema
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import Unpacker, unpack
 from rgbd_kcf_tracker.recordings.files import open_file
-from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
+from rgbd_kcf_tracker.recordings.storage import CACHED_CHUNKS, HEAD, Definition, Scanned, Where
 
 MAGIC = b'\x89MCAP0\r\n'
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
 _RECORD = struct.Struct('<BQ')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
 _CHUNK_HEAD = struct.Struct('<QQQI')
-_CACHED_CHUNKS = 4
 
 
 class _File:
@@ -77,7 +76,7 @@ class McapStorage:
         self._channels: dict[int, tuple[str, str]] = {}
         # Place of a packed chunk: method, place of its data, their length, unpacked length, CRC.
         self._chunks: dict[int, tuple[str, int, int, int, int]] = {}
-        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        self._unpacked = lru_cache(CACHED_CHUNKS)(self._unpack)
         self._file = _File(path)
         magic = self._file.read(0, len(MAGIC))
         if magic != MAGIC:
@@ -120,7 +119,7 @@ class McapStorage:
     def close(self) -> None:
         """See :meth:`Storage.close`."""
         self._file.close()
-        self._cache.clear()
+        self._unpacked.cache_clear()
 
     def _record(
         self,
@@ -222,16 +221,10 @@ class McapStorage:
         self._channels[channel.id] = (channel.topic, kind)
         self.topics[channel.topic] = kind
 
-    def _unpacked(self, chunk: int) -> bytes:
-        if chunk in self._cache:
-            self._cache.move_to_end(chunk)
-            return self._cache[chunk]
+    def _unpack(self, chunk: int) -> bytes:
         method, at, length, size, crc = self._chunks[chunk]
         data = unpack(method, self._file.read(at, length), size)
         # A chunk that was cut off is shorter, and what there is of it is taken.
         if crc and len(data) == size and zlib.crc32(data) != crc:
             raise RecordingError(f'{self.path}: the chunk at byte {chunk} is damaged (wrong CRC)')
-        self._cache[chunk] = data
-        while len(self._cache) > _CACHED_CHUNKS:
-            self._cache.popitem(last=False)
         return data

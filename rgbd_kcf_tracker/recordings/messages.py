@@ -9,6 +9,7 @@ from typing import Any
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.track import Track, TrackState
 
 
@@ -103,4 +104,4 @@ def stamp_of(msg: Any) -> int:
 def header_stamp(header: Any) -> int:
     """Nanoseconds of a header."""
     stamp = header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)

@@ -11,20 +11,27 @@ from __future__ import annotations
 
 import os
 import struct
-from collections import OrderedDict
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.compression import unpack
 from rgbd_kcf_tracker.recordings.files import open_file
-from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where, ros2_type
+from rgbd_kcf_tracker.recordings.storage import (
+    CACHED_CHUNKS,
+    HEAD,
+    NANOSECONDS,
+    Definition,
+    Scanned,
+    Where,
+    ros2_type,
+)
 
 MAGIC = b'#ROSBAG V2.0\n'
 _MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
 _U32 = struct.Struct('<I')
 _MAX_HEADER = 1 << 20
-_CACHED_CHUNKS = 4
 
 Fields = dict[bytes, bytes]
 
@@ -46,7 +53,7 @@ class Ros1Storage:
         self._connections: dict[int, tuple[str, str]] = {}
         # Place of a packed chunk's data: method, their length, unpacked length.
         self._chunks: dict[int, tuple[str, int, int]] = {}
-        self._cache: OrderedDict[int, bytes] = OrderedDict()
+        self._unpacked = lru_cache(CACHED_CHUNKS)(self._unpack)
         self._file = open_file(path)
         self._size = os.fstat(self._file.fileno()).st_size
         magic = self._at(0, len(MAGIC))
@@ -96,7 +103,7 @@ class Ros1Storage:
     def close(self) -> None:
         """See :meth:`Storage.close`."""
         self._file.close()
-        self._cache.clear()
+        self._unpacked.cache_clear()
 
     def _at(self, position: int, length: int) -> bytes:
         self._file.seek(position)
@@ -147,7 +154,7 @@ class Ros1Storage:
         size = min(HEAD, length)
         head = self._at(body, size) if memory is None else memory[body : body + size]
         where = (-1 if chunk is None else chunk, body, length)
-        return Scanned(*connection, seconds * 1_000_000_000 + nanoseconds, head, where)
+        return Scanned(*connection, seconds * NANOSECONDS + nanoseconds, head, where)
 
     def _chunk(self, fields: Fields, body: int, length: int) -> Iterator[Scanned]:
         method = fields.get(b'compression', b'none').decode('ascii', 'replace')
@@ -191,16 +198,9 @@ class Ros1Storage:
         if text:
             self.definitions[kind] = Definition('ros1msg', text)
 
-    def _unpacked(self, chunk: int) -> bytes:
-        if chunk in self._cache:
-            self._cache.move_to_end(chunk)
-            return self._cache[chunk]
+    def _unpack(self, chunk: int) -> bytes:
         method, length, size = self._chunks[chunk]
-        data = unpack(method, self._at(chunk, length), size)
-        self._cache[chunk] = data
-        while len(self._cache) > _CACHED_CHUNKS:
-            self._cache.popitem(last=False)
-        return data
+        return unpack(method, self._at(chunk, length), size)
 
 
 def _operation(fields: Fields) -> int:

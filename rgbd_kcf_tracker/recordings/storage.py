@@ -19,8 +19,12 @@ from typing import Protocol
 Where = tuple[int, int, int]
 """Place of a message in its storage; only the storage knows what the numbers mean."""
 
+NANOSECONDS = 1_000_000_000
+"""Of a second."""
 HEAD = 12
 """Bytes of a message that the scan looks at: enough for the stamp of its header."""
+CACHED_CHUNKS = 4
+"""Chunks of a bag that are kept unpacked: those that the messages of a few topics lie in."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +131,7 @@ def header_stamp(head: bytes, ros1: bool) -> int:
     else:
         order = '<' if head[1] & 1 else '>'
         seconds, nanoseconds = struct.unpack_from(order + 'iI', head, 4)
-    return int(seconds) * 1_000_000_000 + int(nanoseconds)
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
 
 
 def ros2_type(name: str) -> str:

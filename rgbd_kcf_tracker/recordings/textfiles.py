@@ -16,11 +16,12 @@ from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.camera_info import NO, YES, camera_from_info
 from rgbd_kcf_tracker.recordings.files import read_text
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
 INTRINSICS, CAMERA_INFO = 'intrinsics.json', 'camera_info.json'
 
 # ROS stamps hold 32 bits of seconds.
-_LAST_STAMP_NS = (1 << 31) * 1_000_000_000
+_LAST_STAMP_NS = (1 << 31) * NANOSECONDS
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:

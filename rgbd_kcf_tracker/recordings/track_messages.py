@@ -27,12 +27,12 @@ from rgbd_kcf_tracker.recordings.messages import (
     PREDICTED_KEY,
     target_name,
 )
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 from rgbd_kcf_tracker.track import Track
 
 FloatArray = npt.NDArray[np.float64]
 
-NANOSECONDS = 1_000_000_000
 MARKER_LIFETIME_NS = 500_000_000
 """After which a viewer takes away what nobody renews."""
 CLASS_ID = 'target'

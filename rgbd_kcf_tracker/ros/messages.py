@@ -23,8 +23,7 @@ from std_msgs.msg import Header
 
 from rgbd_kcf_tracker.errors import BoxError
 from rgbd_kcf_tracker.geometry import Box
-
-NANOSECONDS = 1_000_000_000
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
 
 def stamp_to_ns(stamp: Time) -> int:

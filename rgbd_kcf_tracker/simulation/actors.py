@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.room import Face, draw_face
 from rgbd_kcf_tracker.simulation.solids import Atlas, Layer, SolidList, Solids, render
 from rgbd_kcf_tracker.simulation.walking import Visit
-from rgbd_kcf_tracker.simulation.world import View
+from rgbd_kcf_tracker.simulation.world import Viewpoint
 
 Vector = npt.NDArray[np.float64]
 Window = tuple[int, int, int, int]
@@ -34,7 +34,7 @@ class PersonActor:
     motion: Motion
     parts: str = 'all'
 
-    def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
+    def draw(self, t: float, view: Viewpoint, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
         solids = self.person.solids(self.motion.pose(t), self.parts)
         return render(solids.moved(view.rotation, view.place), self.person.atlas, view.camera,
@@ -66,7 +66,7 @@ class VisitorActor:
     visits: tuple[Visit, ...]
     wall: float = math.inf
 
-    def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
+    def draw(self, t: float, view: Viewpoint, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
         if not self.here(t):
             return None
@@ -109,7 +109,7 @@ class FacesActor:
     motion: Motion
     height: float
 
-    def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
+    def draw(self, t: float, view: Viewpoint, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
         place = np.array([self.motion.value('x', t), -self.motion.value('lift', t),
                           self.motion.value('z', t)])  # fmt: skip
@@ -125,7 +125,7 @@ class FacesActor:
         return Layer(x0, y0, depth, color) if np.isfinite(depth).any() else None
 
     @staticmethod
-    def _box(faces: list[Face], view: View, window: Window) -> Window | None:
+    def _box(faces: list[Face], view: Viewpoint, window: Window) -> Window | None:
         p = np.array([
             f.corner + a * f.across + b * f.down for f in faces for a in (0, 1) for b in (0, 1)
         ])  # fmt: skip
@@ -165,7 +165,7 @@ class ThingActor:
     middle: Callable[[float], Vector]
     radius: float = 0.0
 
-    def draw(self, t: float, view: View, window: Window, shade: bool) -> Layer | None:
+    def draw(self, t: float, view: Viewpoint, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
         solids = self.shape(t).moved(view.rotation, view.place)
         return render(solids, self.atlas, view.camera, window, view.light, shade)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.geometry import Box, Intrinsics, mask_box
 from rgbd_kcf_tracker.simulation.room import draw_face
 from rgbd_kcf_tracker.simulation.solids import Layer, Lighting, render
-from rgbd_kcf_tracker.simulation.world import Actor, Vector, View, World
+from rgbd_kcf_tracker.simulation.world import Actor, Vector, Viewpoint, World
 
 Image = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
@@ -65,13 +65,13 @@ class Backdrop:
         self.scene, self.camera, self.size = scene, camera, size
         self._still: tuple[Image, Floats] | None = None
 
-    def view(self, t: float) -> View:
+    def view(self, t: float) -> Viewpoint:
         """The camera and the light at ``t`` seconds."""
         rotation, place = self.scene.camera.at(t)
         sun = self.scene.sun / np.linalg.norm(self.scene.sun)
-        return View(self.camera, rotation, place, Lighting(rotation @ sun))
+        return Viewpoint(self.camera, rotation, place, Lighting(rotation @ sun))
 
-    def draw(self, view: View) -> tuple[Image, Floats]:
+    def draw(self, view: Viewpoint) -> tuple[Image, Floats]:
         """Colour and depth, for the caller to draw into.
 
         Returns:
@@ -82,7 +82,7 @@ class Backdrop:
         color, depth = self._still
         return color.copy(), depth.copy()
 
-    def _draw(self, view: View) -> tuple[Image, Floats]:
+    def _draw(self, view: Viewpoint) -> tuple[Image, Floats]:
         w, h = self.size
         color = np.zeros((h, w, 3), np.uint8)
         depth = np.full((h, w), np.inf, np.float32)

@@ -23,7 +23,7 @@ Gain = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Viewpoint:
     """The camera at one moment."""
 
     camera: Intrinsics
@@ -36,7 +36,7 @@ class Actor(Protocol):
     """Something that moves."""
 
     def draw(
-        self, t: float, view: View, window: tuple[int, int, int, int], shade: bool
+        self, t: float, view: Viewpoint, window: tuple[int, int, int, int], shade: bool
     ) -> Layer | None:
         """The actor alone at ``t`` seconds, in the window ``left, top, right, bottom``."""
 

@@ -14,6 +14,8 @@ from rgbd_kcf_tracker.errors import ParameterError
 LARGEST_MESSAGE = 4096
 """Bytes of a message: a box, a name or a parameter takes a few hundred."""
 LONGEST_NAME = 40
+MOST_COMMANDS = 64
+"""Requests that wait to be carried out; a further one is refused."""
 _FARTHEST = 2**53
 """Largest number: up to it integers and floats are the same."""
 

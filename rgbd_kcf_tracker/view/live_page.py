@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.recordings.results import HEADER, row
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, default_parameters
 from rgbd_kcf_tracker.view.board import Board
-from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.commands import MOST_COMMANDS, Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.known import Known, known_by
 from rgbd_kcf_tracker.view.showing import Detail, Seen, figures, show
@@ -43,7 +43,6 @@ NEW_NS = 500_000_000
 """Nanoseconds after which an image no longer shows what a view was taken from."""
 _ANSWERS = 64
 _MOST_ROWS = 200_000
-_MOST_COMMANDS = 64
 _MOST_NAMES = 200
 _MOST_PEOPLE = 200
 
@@ -110,7 +109,7 @@ class LivePage:
 
     def __init__(self, title: str, rate_hz: float, detail: Detail | None = None) -> None:
         self.board = Board()
-        self.commands: queue.Queue[Command] = queue.Queue(_MOST_COMMANDS)
+        self.commands: queue.Queue[Command] = queue.Queue(MOST_COMMANDS)
         self.values: dict[str, Any] = {}
         self._title, self._period = title, 1 / rate_hz
         self._detail = detail

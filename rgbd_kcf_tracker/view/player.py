@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.recordings.results import HEADER, row
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import VARIANTS, default_parameters
 from rgbd_kcf_tracker.view.board import HISTORY_S, Board
-from rgbd_kcf_tracker.view.commands import Command
+from rgbd_kcf_tracker.view.commands import MOST_COMMANDS, Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.known import Known, known_by
 from rgbd_kcf_tracker.view.showing import Detail, Seen, figures, show
@@ -43,7 +43,6 @@ STAGES = ('read', 'track', 'show')
 WARM_UP = 30
 """Frames before the one shown from which a run that follows everyone goes on: who stands before a
 room is known when the room is."""
-_MOST_COMMANDS = 64
 _IDLE_S = 0.2
 
 
@@ -100,7 +99,7 @@ class Player:
         self._parameters = default_parameters(variant) if parameters is None else parameters
         self._detail = detail
         self._first, self._first_box = start, box
-        self._commands: queue.Queue[Command] = queue.Queue(_MOST_COMMANDS)
+        self._commands: queue.Queue[Command] = queue.Queue(MOST_COMMANDS)
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
 

@@ -38,7 +38,7 @@ MIXED_UP = 2.0
 """Log-odds (seven to one) from which two were taken for one another, as for a newcomer who is
 somebody known. At 3 one of twins was lost for a sixth of its scene, and everyone's returns fell
 from 86.3 to 84.7 % (docs/metric.md)."""
-SOMEBODY_NEW = 3.0
+NONE_OF_THEM = 3.0
 """Log-odds (20 to 1) from which who came back is none of those who are known: another side or
 another light may show of him."""
 SIGHTINGS = 2.5
@@ -134,7 +134,7 @@ class MixUps:
             if odds is None:
                 continue
             doubt.said.add(-odds, self._counts * one.view.shows, time)
-            if found is None and doubt.said.odds(SIGHTINGS) > SOMEBODY_NEW:
+            if found is None and doubt.said.odds(SIGHTINGS) > NONE_OF_THEM:
                 found = MixUp(one.person, None, doubt.since)
                 del self._returns[number]
         return found

@@ -48,7 +48,7 @@ TRAVELLED = 0.5
 BEYOND, EMPTY = 0.3, 0.5
 """Metres behind the last sight of somebody at which the camera sees past its place, and the share
 of its outline where it does so if it has gone."""
-ELSEWHERE = 0.02
+ANYWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden)."""
 
 
@@ -107,7 +107,7 @@ class Person:
         off = np.square(places - self.expected(time)).sum(axis=1)
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
-        anywhere = max(ELSEWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
+        anywhere = max(ANYWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
         walks = (1 - anywhere) * _density(off, variance) * ROOM_AREA + anywhere
         stands = self._stands(gone)
         if stands == 0:

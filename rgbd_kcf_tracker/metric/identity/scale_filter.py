@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.features.hog import CELL_SIZE, CHANNELS, HogExtractor
 from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.features.windows import sampled
 
-STEP = 1.02
+SCALE_STEP = 1.02
 """Factor between two sizes, as in the paper: finer ones cannot be told apart."""
 COUNT = 17
 """Sizes, half of the paper's 33 and half of the time: up to 17 % larger or smaller from one frame
@@ -45,7 +45,7 @@ class ScaleFilter:
         self._cols = max(2, round(np.sqrt(AREA * aspect) / CELL_SIZE)) * CELL_SIZE
         self._hog = HogExtractor(self._rows * COUNT, self._cols)
         steps = np.arange(COUNT) - COUNT // 2
-        self._factors = STEP ** steps.astype(float)
+        self._factors = SCALE_STEP ** steps.astype(float)
         label = gaussian_labels((COUNT,), 0.25 * np.sqrt(COUNT))
         self._label = np.conj(fft.rfft(label)).astype(np.complex64)
         self._window = np.hanning(COUNT + 2)[1:-1].astype(np.float32)
