@@ -49,7 +49,7 @@ def thumbnail(picture: Picture, track: Track, truth: Box | None, caption: str) -
 
 
 def _scaled(box: Box | None, factor: float) -> Box | None:
-    return None if box is None else Box(*(factor * v for v in box.as_tuple()))
+    return None if box is None else box.stretched(factor, factor)
 
 
 def contact_sheet(

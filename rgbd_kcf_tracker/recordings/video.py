@@ -217,9 +217,7 @@ def _enlarged(frame: Frame) -> tuple[npt.NDArray[np.uint8], int]:
 
 
 def _times(box: Box | None, factor: int) -> Box | None:
-    if box is None:
-        return None
-    return Box(*(factor * value for value in box.as_tuple()))
+    return None if box is None else box.stretched(factor, factor)
 
 
 def _fitted(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> npt.NDArray[np.uint8]:
