@@ -326,7 +326,8 @@ def test_a_scheduler_that_goes_away_is_one_error_and_what_is_done_is_kept(tmp_pa
                 cluster.close(timeout=5)
 
         with (
-            Cluster(cluster.scheduler_address) as workers,
+            # For so long the client looks for the scheduler anew.
+            Cluster(cluster.scheduler_address, timeout_s=5.0) as workers,
             pytest.raises(WorkersError, match='what is done is kept'),
         ):
             runner.run(

@@ -39,7 +39,11 @@ SIZE = (480, 270)
 
 @lru_cache(maxsize=1)
 def recording() -> SimulatedRecording:
-    return SimulatedRecording('occlusion', 3, 15.0, SIZE)
+    """Rendered once: every chapter goes through it."""
+    scene = SimulatedRecording('occlusion', 3, 15.0, SIZE)
+    rendered = list(scene.frames())
+    scene.frames = lambda start=0, end=None: iter(rendered[start:end])  # type: ignore[method-assign]
+    return scene
 
 
 @lru_cache(maxsize=1)
