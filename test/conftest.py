@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from rgbd_kcf_tracker.bench.domains import reserved_domain
+from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE
 
 if TYPE_CHECKING:
     from ros_rig import Rig
@@ -66,6 +67,17 @@ def _own_ros_domain(request: pytest.FixtureRequest) -> Iterator[None]:
     folder = request.getfixturevalue('tmp_path_factory').mktemp('ros_log')
     with ros_environment(folder):
         yield
+
+
+@pytest.fixture
+def _process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What a main program changes in its process, put back."""
+    monkeypatch.setenv(PROFILE_VARIABLE, '')
+    monkeypatch.setattr(os, 'nice', lambda _: None)  # that of the tests stays
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture

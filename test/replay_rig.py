@@ -59,14 +59,19 @@ def box_text(box: Box) -> str:
     return ','.join(repr(v) for v in box.as_tuple())
 
 
-def start(module: str, *, folder: Path, **parameters: Any) -> subprocess.Popen[str]:
-    """A node of this package as its own process, told its parameters by a file."""
+def told(module: str, folder: Path, parameters: dict[str, Any]) -> list[str]:
+    """The arguments that tell a node its parameters, by a file."""
     lines = ['/**:', '  ros__parameters:']
     lines += [f'    {name}: {json.dumps(value)}' for name, value in parameters.items()]
     file = folder / f'{module}.yaml'
     file.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    return ['--ros-args', '--params-file', str(file)]
+
+
+def start(module: str, *, folder: Path, **parameters: Any) -> subprocess.Popen[str]:
+    """A node of this package as its own process."""
     command = [sys.executable, '-m', f'rgbd_kcf_tracker.ros.{module}']
-    command += ['--ros-args', '--params-file', str(file)]
+    command += told(module, folder, parameters)
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=dict(os.environ)
     )

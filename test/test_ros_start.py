@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -30,7 +30,6 @@ from rgbd_kcf_tracker.ros import (
     tracker_node,
     viewer_main,
 )
-from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE
 
 pytestmark = pytest.mark.ros
 
@@ -42,17 +41,6 @@ MAINS = {
 }
 if find_spec('aiohttp') is not None:
     MAINS['viewer'] = viewer_main.main
-
-
-@pytest.fixture
-def _process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """What a main program changes in its process, put back."""
-    monkeypatch.setenv(PROFILE_VARIABLE, '')
-    monkeypatch.setattr(os, 'nice', lambda _: None)  # that of the tests stays
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 @pytest.mark.usefixtures('_process')
