@@ -87,8 +87,8 @@ def test_center_error_and_its_parts_are_prediction_minus_truth():
 
 
 def test_princeton_ratio_rewards_absence_told_truly_and_punishes_the_rest():
-    ratios = princeton.overlap_ratio([THIRD, None, None, TRUTH], [TRUTH, None, TRUTH, None])
-    assert ratios == pytest.approx([1 / 3, 1, -1, -1])
+    c = compare([THIRD, None, None, TRUTH], [TRUTH, None, TRUTH, None], skip=0)
+    assert c.ratio == pytest.approx([1 / 3, 1, -1, -1])
 
 
 def test_princeton_success_is_strictly_above_the_threshold():
@@ -246,11 +246,7 @@ def test_a_tracker_that_never_gives_a_box_has_no_tp_and_fp():
     assert confusion.confusion_by_total(confusion.Counts()).tp is None
 
 
-def test_precision_over_time_and_average_precision():
-    c = compare([None, TRUTH, AWAY, TRUTH, TRUTH], [None, TRUTH, TRUTH, TRUTH, TRUTH], skip=0)
-    running = confusion.precision_over_time(c.overlap, c.said, c.there)
-    assert math.isnan(running[0])
-    assert running[1:] == pytest.approx([1, 1 / 2, 2 / 3, 3 / 4])
+def test_average_precision():
     scenes = [confusion.Counts(tp=3, fp=1), confusion.Counts(tp=100), confusion.Counts(tn=5)]
     assert confusion.average_precision(scenes) == pytest.approx((0.75 + 1) / 2)
     assert math.isnan(confusion.average_precision([]))
@@ -282,11 +278,6 @@ def test_all_measures_of_one_sequence_by_hand():
     assert m.otb_auc == pytest.approx((11 + 10) / 4 / 21)
     # R curve: the frame told absent passes all but 1.0
     assert m.success_auc == pytest.approx((11 + 10 + 20) / 6 / 21)
-
-
-def test_measures_agree_with_princeton_ratio():
-    c = compare(SAID, THERE, skip=0)
-    assert c.ratio == pytest.approx(princeton.overlap_ratio(SAID, THERE))
 
 
 def test_a_body_box_counts_where_it_fits_better_but_never_makes_the_target_present():

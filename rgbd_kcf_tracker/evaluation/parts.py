@@ -28,7 +28,6 @@ from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.recordings.outputs import moved_into_place, write_atomically
 
 FOLDER = 'parts'
-_NOT_JOINED = (FOLDER, 'runs.jsonl')
 
 
 @dataclass(frozen=True, slots=True)

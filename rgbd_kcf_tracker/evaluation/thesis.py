@@ -15,16 +15,13 @@ PRECISION_BY_SCENARIO: dict[str, float] = {
 }
 """Table 3.2, averages of KCF over four data sets."""
 
-PRINCETON_COLUMNS = (
-    'human', 'animal', 'rigid', 'large', 'small', 'slow', 'fast', 'yes', 'no', 'passive', 'active',
-)  # fmt: skip
-
 PRINCETON: dict[str, tuple[float, ...]] = {
     'thesis: RGB-D KCF': (41, 37, 42, 46, 40, 56, 35, 47, 51, 52, 46),
     'thesis: KCF': (39.7, 49.4, 54.6, 40.1, 52.5, 57.8, 42.9, 35.2, 63.6, 56.4, 43.7),
     'thesis: Dhog': (43.3, 48.3, 55.9, 47.2, 50.3, 52.7, 47.5, 38.4, 63.5, 54.3, 46.9),
 }
-"""Table 4.1, success rate in percent on the 95 sequences of the benchmark."""
+"""Table 4.1, success rate in percent on the 95 sequences of the benchmark: human, animal, rigid,
+large, small, slow, fast, occluded, not occluded, passive, active."""
 
 AVERAGE_PRECISION: dict[str, float] = {'thesis: RGB-D KCF': 66.35, 'thesis: KCF': 39.99}
 """Table 4.5, in percent."""

@@ -46,7 +46,7 @@ class Comparison:
 
     @property
     def ratio(self) -> Array:
-        """``(N,)`` Princeton's r_i."""
+        """``(N,)`` Princeton's r_i: IoU where both boxes exist, 1 for neither, -1 for one alone."""
         ratio = np.where(self.said == self.there, self.overlap, -1.0)
         ratio[~self.said & ~self.there] = 1.0
         return ratio

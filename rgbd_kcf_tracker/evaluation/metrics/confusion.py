@@ -109,14 +109,6 @@ def precision(counts: Counts) -> float:
     return counts.tp / boxes if boxes else math.nan
 
 
-def precision_over_time(overlaps: Array, said: Mask, there: Mask) -> Array:
-    """``(N,)`` precision of the frames up to each, NaN before the first box (thesis Figure 3.7)."""
-    hit = said & there & (np.nan_to_num(overlaps, nan=-1.0) >= HIT_IOU)
-    boxes = np.cumsum(said)
-    running: Array = np.where(boxes > 0, np.cumsum(hit) / np.maximum(boxes, 1), np.nan)
-    return running
-
-
 def average_precision(scenes: Sequence[Counts]) -> float:
     """AP: mean of the scenes' precisions, each scene counting once (thesis 4.3.1).
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Boxes, iou, present
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 
 THRESHOLDS: Array = np.linspace(0.0, 1.0, 21)
 """Overlaps at which the success rate is drawn: 0, 0.05, ..., 1."""
@@ -27,15 +27,6 @@ CATEGORIES: dict[str, tuple[str, ...]] = {
     'motion type': ('passive', 'active'),
 }
 """The benchmark's five splits of its sequences: eleven categories, as in thesis Table 4.1."""
-
-
-def overlap_ratio(predicted: Boxes, truth: Boxes) -> Array:
-    """``(N,)`` r_i: IoU where both boxes exist, 1 where neither does, -1 where exactly one does."""
-    ratio = iou(predicted, truth)
-    said, there = present(predicted), present(truth)
-    ratio[~said & ~there] = 1.0
-    ratio[said != there] = -1.0
-    return ratio
 
 
 def success_rate(ratios: Array, threshold: float = 0.5) -> float:
