@@ -455,7 +455,7 @@ class Follower:
             return False
         near = abs(look.depth / self._last_depth - 1) < SAME_DEPTH
         before = account.scene.before[_part(account.scene, look.box)]
-        stands = np.count_nonzero(before) >= (1 - STANDING) * before.size > 0
+        stands = np.count_nonzero(before) >= (1 - IS_ROOM) * before.size > 0
         return bool(near and stands and look.box.intersection(self._last_box) > 0)
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
@@ -493,7 +493,7 @@ class Follower:
         if np.count_nonzero(depth) < READ * depth.size:
             return False
         if _area(account.scene.view, look) < SMALL:
-            return bool(np.count_nonzero(account.scene.before[part]) < (1 - STANDING) * depth.size)
+            return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
         outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
