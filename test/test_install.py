@@ -219,6 +219,21 @@ def test_what_reads_bags_says_what_is_missing(
     assert 'Traceback' not in done.stderr
 
 
+@pytest.mark.parametrize('name', [name for name in EXECUTABLES if name != 'rgbd-kcf'])
+def test_a_node_without_ros_says_what_is_missing(name: str) -> None:
+    code = (
+        "import sys; sys.modules['rclpy'] = None\n"
+        f'from rgbd_kcf_tracker.ros.{name}_main import main\nsys.exit(main([]))'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', code], cwd=ROOT, text=True, capture_output=True, timeout=120,
+        env=clean_environment() | {'PYTHONPATH': str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith(f'{name}: rclpy is missing: source ROS 2')
+    assert done.stderr.count('\n') == 1
+
+
 def test_the_image_is_made_of_files_that_are_there() -> None:
     text = (ROOT / 'Dockerfile').read_text(encoding='utf-8').replace('\\\n', ' ')
     copied = [line.split()[1:-1] for line in text.splitlines() if line.startswith('COPY')]

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 def main(arguments: list[str] | None = None) -> int:
     """Ask for following and for stopping until SIGINT or SIGTERM."""
     stop = Stop()  # first of all: what follows takes a second
-    from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
+    from rgbd_kcf_tracker.ros.process import ends_at_once, node_parser, run, spin
 
     parser = node_parser(
         'follow',
         "Have Nav2's Following Server follow the tracker's target (a ROS 2 node).",
         'follow --ros-args -p tracker:=tracker -p give_up_after:=5.0',
     )
-    if asks_for_help(parser, arguments):
-        return 0
+    if (status := ends_at_once(parser, arguments)) is not None:
+        return status
     from rgbd_kcf_tracker.ros.follow_node import FollowNode
 
     def live(executor: Executor, node: FollowNode) -> None:

@@ -9,6 +9,7 @@ import argparse
 import re
 import sys
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
 from rgbd_kcf_tracker.errors import RgbdKcfError
@@ -41,13 +42,24 @@ def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
             node.get_logger().error(f'{type(error).__name__}: {error}')
 
 
-def asks_for_help(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> bool:
-    """Print the help where it is asked for, wherever among ROS's arguments; starts nothing."""
+def ends_at_once(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> int | None:
+    """Print the help where it is asked for, wherever among ROS's arguments, or that ROS is missing.
+
+    Returns:
+        The exit status; None where the node can be made.
+    """
     given = sys.argv[1:] if arguments is None else arguments
-    if not {'-h', '--help'} & set(given):
-        return False
-    parser.print_help()
-    return True
+    if {'-h', '--help'} & set(given):
+        parser.print_help()
+        return 0
+    if find_spec('rclpy') is None:
+        print(
+            f'{parser.prog}: rclpy is missing: source ROS 2 (. /opt/ros/jazzy/setup.bash), or '
+            "pip install 'rgbd_kcf_tracker[ros]'",
+            file=sys.stderr,
+        )
+        return USER_MISTAKE
+    return None
 
 
 def node_parser(program: str, description: str, example: str) -> argparse.ArgumentParser:
@@ -79,8 +91,6 @@ def run(
     Returns:
         0 at the end or when told to stop, 2 for what the user can mend, 1 for any other failure.
     """
-    if asks_for_help(parser, arguments):
-        return 0
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions

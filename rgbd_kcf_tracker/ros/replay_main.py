@@ -23,7 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
 
     from rgbd_kcf_tracker.live.memory import keep_large_blocks
     from rgbd_kcf_tracker.recordings import BAG_LIBRARIES, HOW_TO_GET_THEM
-    from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
+    from rgbd_kcf_tracker.ros.process import ends_at_once, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
     parser = node_parser(
@@ -31,8 +31,8 @@ def main(arguments: list[str] | None = None) -> int:
         'Publish a recording as if its camera were there (a ROS 2 node).',
         'replay --ros-args -p bag:=walk.mcap -p lockstep:=true',
     )
-    if asks_for_help(parser, arguments):
-        return 0
+    if (status := ends_at_once(parser, arguments)) is not None:
+        return status
     keep_large_blocks()  # before NumPy and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings
     try:

@@ -22,7 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the tracker node until SIGINT or SIGTERM."""
     stop = Stop()  # first of all: what follows takes a second
     from rgbd_kcf_tracker.live.memory import keep_large_blocks, set_objects_aside
-    from rgbd_kcf_tracker.ros.process import asks_for_help, node_parser, run, spin
+    from rgbd_kcf_tracker.ros.process import ends_at_once, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
     parser = node_parser(
@@ -30,8 +30,8 @@ def main(arguments: list[str] | None = None) -> int:
         'Follow one target in the colour and depth images of a camera (a managed ROS 2 node).',
         'tracker --ros-args -p variant:=kcf -r color/image:=/camera/color/image_raw',
     )
-    if asks_for_help(parser, arguments):
-        return 0
+    if (status := ends_at_once(parser, arguments)) is not None:
+        return status
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     keep_large_blocks()  # before NumPy, OpenCV and ROS allocate
     ensure_image_transport()  # before Fast DDS reads its settings

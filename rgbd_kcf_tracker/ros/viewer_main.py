@@ -28,7 +28,7 @@ def main(arguments: list[str] | None = None) -> int:
     from rgbd_kcf_tracker.errors import MissingExtraError
     from rgbd_kcf_tracker.extras import require
     from rgbd_kcf_tracker.live.memory import keep_large_blocks
-    from rgbd_kcf_tracker.ros.process import USER_MISTAKE, asks_for_help, node_parser, run, spin
+    from rgbd_kcf_tracker.ros.process import USER_MISTAKE, ends_at_once, node_parser, run, spin
     from rgbd_kcf_tracker.ros.transport import ensure_image_transport
 
     parser = node_parser(
@@ -36,8 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
         'Show a running tracker in a browser, and pick its target there (a ROS 2 node).',
         'viewer --ros-args -p port:=9000 -r color/image:=/camera/color/image_raw',
     )
-    if asks_for_help(parser, arguments):
-        return 0
+    if (status := ends_at_once(parser, arguments)) is not None:
+        return status
     # Where there are few cores it gives way to the tracker.
     with contextlib.suppress(OSError):
         os.nice(GIVE_WAY)
