@@ -243,6 +243,16 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         assert candidate == pytest.approx(target, abs=0.02)
         assert page.value("document.querySelectorAll('.views b i').length") >= 9
         assert page.value('page.shown.floor') is None  # the scene has none
+        page.value(
+            "window.sent = []; window.really = send; "
+            "send = m => { sent.push(m.do); if (m.do === 'ack') really(m); }"
+        )
+        x, y = page.value(
+            "(b => [b.x, b.y])(document.getElementById('picture').getBoundingClientRect())"
+        )
+        page.drag((x + 20, y + 20), (x + 60, y + 80))
+        assert [kind for kind in page.value('sent') if kind != 'ack'] == ['box']
+        page.value('send = really')
         at = rig.index + 1  # type: ignore[attr-defined]
         play_hidden(rig, range(at, at + 20))
         # In the very first hidden frame there are none yet.
@@ -254,6 +264,8 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         # No pictures any more: the page says so, until they come again.
         page.until("document.getElementById('banner').innerText.includes('No picture for')")
         assert page.value("document.getElementById('state').innerText") == 'waiting'
+        assert page.value('page.shown.targets.length') == 0
+        assert page.value("document.querySelectorAll('#targets li').length") == 0
         play_hidden(rig, range(at + 20, at + 23))
         page.until("document.getElementById('banner').hidden")
         assert page.value("document.getElementById('state').innerText") != 'waiting'
@@ -426,6 +438,18 @@ def test_evidence_and_answer_make_one_entry_whichever_comes_first() -> None:
     first, second = page.board.take((-1, 0))[2]['targets']
     assert [c['cues'] for c in first['considered']] == [{'look': 2.0}, {'look': -0.4}]
     assert 'considered' not in second
+
+
+def test_a_recording_that_starts_anew_starts_the_last_minute_anew() -> None:
+    """Also where it starts with the very stamp that the page saw first."""
+    page = LivePage('tracker', 10)
+    for stamp in (0, 10**9, 2 * 10**9, 0):
+        page.answer(stamp, [Track(Box(0, 0, 20, 40), TrackState.TRACKING, 0.9, id=3)])
+    page.answer(10**9, [Track(None, TrackState.OCCLUDED, id=3)])
+    page.board.show({}, {})
+    assert [e['t'] for e in page.board.take((-1, 0))[2]['entries']] == [0.0, 1.0]
+    with pytest.raises(BoxError, match='not in sight'):
+        page.box_of(3)
 
 
 def test_views_have_the_pictures_that_they_are_of_or_none() -> None:

@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.insight import Insight, KnownView
 from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
+from rgbd_kcf_tracker.live.timeline import Timeline
 from rgbd_kcf_tracker.parameters import Parameters, parameter
 from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.recordings.results import HEADER, row
@@ -121,6 +122,7 @@ class LivePage:
         self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
         self._count = 0
         self._origin_ns: int | None = None
+        self._timeline = Timeline()
         self._frame: Frame | None = None
         self._figures: dict[str, str] = {}
         self._lately = 0
@@ -218,6 +220,9 @@ class LivePage:
         """``~/state``: the answer to a frame, the chosen target first."""
         self._settle()
         before = self._latest().tracks
+        restarted = self._timeline.advance(stamp_ns, time.monotonic_ns()).restarted
+        if restarted:  # the same stamps come again, with other answers
+            self._answers.clear()
         found = {track.id: track for track in tracks if track.state is not TrackState.IDLE}
         self._answers[stamp_ns] = _Answer(found)
         while len(self._answers) > _ANSWERS:
@@ -232,7 +237,7 @@ class LivePage:
                 looks.known = tuple(known for known in looks.known if known.view is not None)
         while len(self._looks) > _MOST_PEOPLE:
             self._looks.popitem(last=False)
-        if self._origin_ns is None or stamp_ns < self._origin_ns:
+        if self._origin_ns is None or restarted or stamp_ns < self._origin_ns:
             self._origin_ns = stamp_ns
             self.board.rewind([])
         self._count += 1

@@ -370,7 +370,7 @@ function listenForPicking() {
     from = placeIn(event);
     start = [event.clientX, event.clientY];
     page.frameAtStart = currentFrame();
-    if (page.shown.playing) send({do: 'pause'});
+    if (page.shown.playing && !page.hello.live) send({do: 'pause'});
     picture.setPointerCapture(event.pointerId);
   });
   picture.addEventListener('pointermove', event => {
@@ -460,6 +460,10 @@ function watchForPictures() {
     if (!page.hello || !page.hello.live || !open || document.hidden) return;
     const seconds = (performance.now() - page.last) / 1000;
     if (seconds < 3 + 2 * page.hello.period) return;
+    if (!page.waiting && page.shown) {
+      page.shown.targets = [];
+      redraw();
+    }
     page.waiting = true;
     $('state').dataset.state = 'idle';
     $('state').textContent = 'waiting';
