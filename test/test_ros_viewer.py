@@ -244,7 +244,7 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         assert page.value("document.querySelectorAll('.views b i').length") >= 9
         assert page.value('page.shown.floor') is None  # the scene has none
         page.value(
-            "window.sent = []; window.really = send; "
+            'window.sent = []; window.really = send; '
             "send = m => { sent.push(m.do); if (m.do === 'ack') really(m); }"
         )
         x, y = page.value(
