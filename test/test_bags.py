@@ -13,7 +13,7 @@ import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from bag_rig import (
     COLOR,
     DEPTH,
     INFO,
+    ROS2,
     SIZE,
     START_NS,
     STEP_NS,
@@ -63,7 +64,9 @@ from rgbd_kcf_tracker.recordings.encoding import (
     encode_compressed_depth,
     encode_depth,
 )
+from rgbd_kcf_tracker.recordings.mcap_writer import McapWriter, definition_text
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
+from rgbd_kcf_tracker.recordings.storage import Definition
 
 FRAMES = make_frames()
 
@@ -275,6 +278,39 @@ def test_one_damaged_depth_image_costs_its_depth_only(tmp_path: Path) -> None:
     frames, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
     assert [f.depth is None for f in frames] == [True, False, True, False, False, False]
     assert any('frame 2' in w and 'cut off' in w for w in warnings)
+
+
+def test_one_damaged_message_of_a_bag_with_packed_messages_costs_that_one(tmp_path: Path) -> None:
+    folder = write_rosbag2(tmp_path / 'a', camera_messages(FRAMES), 'SQLITE3', 'MESSAGE')
+    with closing(sqlite3.connect(next(folder.glob('*.db3')))) as base, base:
+        base.execute(
+            "UPDATE messages SET data = x'0011223344' WHERE id = (SELECT m.id FROM messages m "
+            'JOIN topics t ON m.topic_id = t.id WHERE t.name = ? LIMIT 1 OFFSET 2)', (COLOR,),
+        )  # fmt: skip
+    with open_recording(folder) as recording:
+        frames = recording.frames()
+        assert_same_frames([next(frames), next(frames)], FRAMES[:2])
+        with pytest.raises(ImageError, match=rf'{folder}: message 2 of {COLOR}: zstd .*convert'):
+            next(frames)
+    bag = RawBag(folder)
+    count, warnings = copy_bag(bag, tmp_path / 'mended.mcap')
+    bag.close()
+    assert (count, len(warnings)) == (3 * len(FRAMES) - 1, 1)
+    assert_same_frames(read(tmp_path / 'mended.mcap')[0], FRAMES[:2] + FRAMES[3:])
+
+
+def test_convert_is_advised_where_it_mends_alone(tmp_path: Path) -> None:
+    """It copies messages of ROS 2 byte by byte, those that are not what they are called too."""
+    path = tmp_path / 'a.mcap'
+    with McapWriter(path, 'none') as writer:
+        for s in camera_messages(FRAMES):
+            data = bytes(ROS2.serialize_cdr(s.message, s.type))
+            kept = data[:60] if s.topic == COLOR else data
+            definition = Definition('ros2msg', definition_text(s.type))
+            writer.write_raw(s.topic, s.type, kept, s.log_ns, definition)
+    with open_recording(path) as recording, pytest.raises(ImageError, match='is no') as told:
+        next(recording.frames())
+    assert 'rgbd-kcf convert' not in str(told.value)
 
 
 def test_a_damaged_colour_image_is_named(tmp_path: Path) -> None:

@@ -136,14 +136,18 @@ class BagRecording(Closing):
         )
 
     def _read_color(self, index: int, number: int) -> ColorImage:
+        data: bytes | None = None
         try:
-            msg = self.bag.message(self._color, index)
+            data = self.bag.read(self._color, index)
+            msg = self.bag.deserialize(self._color, data, index)
             decode = decode_compressed_color if _compressed(self._color) else decode_color
             return decode(msg, self._max_pixels)
         except RgbdKcfError as error:
             where = f'{self.path}, frame {number} of {self.topics.color}'
             mend = ' (rgbd-kcf convert writes a bag without what cannot be read)'
-            hint = mend if isinstance(error, RecordingError) else ''
+            # Messages of ROS 2 are copied as they are, whatever is in them.
+            mends = isinstance(error, RecordingError) and (data is None or self.bag.ros1)
+            hint = mend if mends else ''
             raise ImageError(f'{where}: {error}{hint}') from None
 
     def _read_depth(self, index: int, number: int) -> DepthImage | None:

@@ -77,7 +77,10 @@ class RawBag:
         """
         file, *where = topic.places[4 * index : 4 * index + 4]
         data = self._storages[file].read((where[0], where[1], where[2]))
-        return unpack(self._message_method, data)
+        try:
+            return unpack(self._message_method, data)
+        except RecordingError as error:
+            raise RecordingError(f'{self.path}: message {index} of {topic.name}: {error}') from None
 
     def message(self, topic: Topic, index: int) -> Any:
         """The message number ``index`` of a topic, with its fields.
@@ -124,8 +127,11 @@ class RawBag:
                     continue
                 topic.add(number, message, storage.ros1)
                 if self._message_method:
-                    head = unpack(self._message_method, storage.read(message.where))
-                    topic.stamp_ns[-1] = header_stamp(head, storage.ros1)
+                    try:
+                        head = unpack(self._message_method, storage.read(message.where))
+                        topic.stamp_ns[-1] = header_stamp(head, storage.ros1)
+                    except RecordingError:  # whoever reads it is told
+                        topic.stamp_ns[-1] = message.log_ns
             for name, kind in storage.topics.items():
                 topics.setdefault(name, Topic(name, kind))
             self.definitions.update(storage.definitions)
