@@ -216,9 +216,9 @@ class ReplayNode(Node):
 
 
 def as_parameters(text: str) -> str:
-    """What the readers say of options of the command line, in the node's parameters."""
-    text = re.sub(r'--(color|depth|info)-topic (/\S+|none)', r'-p \1_topic:=\2', text)
-    return re.sub(r'--(color|depth|info)-topic', r'-p \1_topic:=TOPIC', text)
+    """What the readers say of options of the command line, in what the node and launch files take."""
+    text = re.sub(r'--(color|depth|info)-topic (/\S+|none)', r'the parameter \1_topic:=\2', text)
+    return re.sub(r'--(color|depth|info)-topic', r'the parameter \1_topic:=TOPIC', text)
 
 
 def message_class(name: str) -> Any | None:
