@@ -216,7 +216,7 @@ class ReplayNode(Node):
 
 
 def as_parameters(text: str) -> str:
-    """What the readers say of options of the command line, in what the node and launch files take."""
+    """What readers say of the command line's options, as the node and launch files take them."""
     text = re.sub(r'--(color|depth|info)-topic (/\S+|none)', r'the parameter \1_topic:=\2', text)
     return re.sub(r'--(color|depth|info)-topic', r'the parameter \1_topic:=TOPIC', text)
 
