@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.cli import bench
 from rgbd_kcf_tracker.cli.common import progress
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.evaluation import jobs, runner, speed
+from rgbd_kcf_tracker.evaluation import jobs, report, runner, speed
 from rgbd_kcf_tracker.recordings import open_recording
 
 SMALL = ['--size', '160x90', '--duration', '1']
@@ -177,6 +177,24 @@ def test_evaluate_finishes_the_run_under_way_and_reports(
     assert 'kcf,behind_box/1,14,' in table
     assert main([*EVALUATE, report, '--jobs', '1']) == 0
     assert begun[2:] == ['crowd/1']
+
+
+def test_evaluate_finishes_the_report_that_it_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    real = report._write_failures
+
+    def stopping(*words: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        real(*words)
+
+    monkeypatch.setattr(report, '_write_failures', stopping)
+    folder = tmp_path / 'report'
+    assert main([*EVALUATE, str(folder), '--jobs', '1']) == 130
+    said = capsys.readouterr()
+    assert 'the report is written, then it stops' in said.err
+    assert f'report: {folder / report.PAGE}' in said.out
+    assert (folder / report.PAGE).stat().st_size > 1000
 
 
 def test_evaluate_stopped_before_the_first_run_says_so(

@@ -173,14 +173,17 @@ def _merge(args: argparse.Namespace) -> int:
 
 
 def _report(folder: Path, whole: Whole) -> int:
+    with interrupts.held('the report is written, then it stops'):
+        return _report_everyone(folder, whole) if whole.everyone else _report_one(folder, whole)
+
+
+def _report_one(folder: Path, whole: Whole) -> int:
     from rgbd_kcf_tracker.evaluation.export import export
     from rgbd_kcf_tracker.evaluation.perframe import collect
     from rgbd_kcf_tracker.evaluation.place_tables import places_table
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_report
     from rgbd_kcf_tracker.evaluation.score_tables import overview
 
-    if whole.everyone:
-        return _report_everyone(folder, whole)
     collected = collect(folder, whole.sequences, whole.contenders, whole.options)
     for form in whole.exports:
         export(folder, whole.sequences, whole.contenders, whole.options, form)
