@@ -332,6 +332,19 @@ def test_stream_whose_size_changes_goes_on(
 # -- convert, info, main -----------------------------------------------------------------------
 
 
+def test_convert_of_a_bag_refuses_options_that_choose_in_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It copies all that is in it: an option passed over would be taken for obeyed."""
+    source, copy = tmp_path / 'a.mcap', tmp_path / 'b.mcap'
+    assert main(['simulate', str(source), '--size', '160x90', '--duration', '0.2']) == 0
+    capsys.readouterr()
+    for option in (['--depth-topic', 'none'], ['--color-topic', '/other'], ['--max-pixels', '9']):
+        assert main(['convert', str(source), str(copy), *option]) == 2
+        assert f'{option[0]} means nothing for a bag' in capsys.readouterr().err
+        assert not copy.exists()
+
+
 def test_convert_a_bag_that_was_cut_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write_mcap(tmp_path / 'a.mcap', camera_messages(make_frames(6)))
     source.write_bytes(source.read_bytes()[:50_000])

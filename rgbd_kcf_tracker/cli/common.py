@@ -137,7 +137,7 @@ def open_source(args: argparse.Namespace) -> Recording:
     if args.source is None:
         from rgbd_kcf_tracker.view.sources import SimulatedRecording
 
-        _refuse_reading(args)
+        refuse_reading(args, 'without a SOURCE: give one, or leave it out')
         seed = args.usual_seed if args.seed is None else args.seed
         return SimulatedRecording(args.scenario or 'occlusion', seed)
     from rgbd_kcf_tracker.recordings import open_recording
@@ -166,16 +166,19 @@ def read_options(args: argparse.Namespace) -> ReadOptions:
     )
 
 
-def _refuse_reading(args: argparse.Namespace) -> None:
+def refuse_reading(args: argparse.Namespace, why: str) -> None:
+    """Refuse the options of :func:`add_reading_options` where they mean nothing.
+
+    Raises:
+        ParameterError: for one that is given.
+    """
     from rgbd_kcf_tracker.recordings import ReadOptions
 
     given, usual = read_options(args), ReadOptions()
     for field in dataclasses.fields(usual):
         if getattr(given, field.name) != getattr(usual, field.name):
             option = '--' + field.name.removesuffix('_s').replace('_', '-')
-            raise ParameterError(
-                f'{option} means nothing without a SOURCE: give one, or leave it out'
-            )
+            raise ParameterError(f'{option} means nothing {why}')
 
 
 def parse_box(text: str) -> Box:

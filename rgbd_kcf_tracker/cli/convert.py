@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_reading_options,
     progress,
     read_options,
+    refuse_reading,
     warn,
 )
 from rgbd_kcf_tracker.errors import RecordingError
@@ -85,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
             warnings.show()
         print(f'{dest}: {count} frames')
         return 0
+    refuse_reading(args, 'for a bag, of which every message is copied: leave it out')
     bag = RawBag(source)
     try:
         Warnings(bag.warnings).show()
