@@ -14,6 +14,7 @@ import pytest
 from scipy.io import savemat
 
 from rgbd_kcf_tracker.batch.content import files_digest
+from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import DatasetError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import (
@@ -497,3 +498,21 @@ def test_a_bag_without_truth_says_so(tmp_path: Path, shared_data: Path):
     (sequence,) = open_dataset(str(bag))
     with pytest.raises((DatasetError, RecordingError), match='2019-05-03'):
         sequence.open()
+
+
+def test_the_camera_of_a_bag_can_be_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the reader's messages say: it finds none, or several."""
+    bag = tmp_path / 'normal_4.mcap'
+    assert main(['simulate', str(bag), '--size', '160x90', '--duration', '0.3']) == 0
+    found, without = (
+        open_dataset(str(bag), DatasetOptions(depth_topic=topic))[0] for topic in (None, 'none')
+    )
+    assert all(sample.frame.depth is not None for sample in found.open().samples)
+    assert all(sample.frame.depth is None for sample in without.open().samples)
+    assert found.identity != without.identity  # or a result of one would stand for the other
+    words = ['evaluate', str(bag), '--variants', 'kcf', '--jobs', '1', '--color-topic', '/other']
+    capsys.readouterr()
+    assert main([*words, '--report', str(tmp_path / 'report')]) == 2
+    assert 'has no topic /other: give another as --color-topic' in capsys.readouterr().err

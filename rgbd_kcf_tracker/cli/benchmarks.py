@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import parse_intrinsics
+from rgbd_kcf_tracker.cli.common import add_topic_options, parse_intrinsics
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
     EXIT_FAILURES,
@@ -55,6 +55,7 @@ def add_data_options(parser: argparse.ArgumentParser) -> None:
         '--rate', type=float, metavar='HZ',
         help='render scenes at this rate, and thin recordings out to it (5, 15, 30)',
     )  # fmt: skip
+    add_topic_options(group)
     group.add_argument('--no-depth', action='store_true', help='give the trackers colour alone')
     group.add_argument(
         '--intrinsics', metavar='FX,FY,CX,CY',
@@ -96,6 +97,9 @@ def data_options(args: argparse.Namespace, everyone: bool = False) -> DatasetOpt
         size=_size(args.size),
         names=tuple(words(args.sequences or '')),
         everyone=everyone,
+        color_topic=args.color_topic,
+        depth_topic=args.depth_topic,
+        info_topic=args.info_topic,
     )
 
 
@@ -182,6 +186,10 @@ def in_words(args: argparse.Namespace) -> str:
         parts.append(f'only the scenarios {args.scenarios}')
     if args.fps != DEFAULT_FPS:
         parts.append(f'{args.fps:g} Hz where a folder states none')
+    for role in ('color', 'depth', 'info'):
+        topic = getattr(args, f'{role}_topic')
+        if topic is not None:
+            parts.append(f'{role} topic {topic}')
     if args.rate is not None:
         parts.append(f'{args.rate:g} Hz')
     if args.no_depth:

@@ -30,9 +30,8 @@ SOURCE_HELP = (
 )
 
 
-def add_reading_options(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that say how a recording is read."""
-    group = parser.add_argument_group('reading')
+def add_topic_options(group: argparse._ArgumentGroup) -> None:
+    """Declare the options that name the topics of a bag's camera."""
     group.add_argument(
         '--color-topic', metavar='TOPIC', help='colour topic of a bag (found if left out)'
     )
@@ -44,6 +43,12 @@ def add_reading_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         '--info-topic', metavar='TOPIC', help='CameraInfo topic of a bag (found if left out)'
     )
+
+
+def add_reading_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the options that say how a recording is read."""
+    group = parser.add_argument_group('reading')
+    add_topic_options(group)
     group.add_argument(
         '--tolerance',
         metavar='SECONDS',

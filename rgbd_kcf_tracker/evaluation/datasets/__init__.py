@@ -58,6 +58,7 @@ class DatasetOptions:
         size: of simulated images.
         names: leave out sequences whose name holds none of these texts; empty for none.
         everyone: recordings in which everyone is followed, instead of one target each.
+        color_topic, depth_topic, info_topic: of the camera in bags; None to find them.
     """
 
     kind: str = 'auto'
@@ -69,6 +70,9 @@ class DatasetOptions:
     size: tuple[int, int] = (960, 540)
     names: tuple[str, ...] = ()
     everyone: bool = False
+    color_topic: str | None = None
+    depth_topic: str | None = None
+    info_topic: str | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -139,7 +143,12 @@ def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
     kind = options.kind
     if options.everyone:
         return everyone.find(path, options.fps) if everyone.is_sequence(path) else []
-    read = ReadOptions(fps=options.fps)
+    read = ReadOptions(
+        fps=options.fps,
+        color_topic=options.color_topic,
+        depth_topic=options.depth_topic,
+        info_topic=options.info_topic,
+    )
     if recorded.is_sequence(path) and kind in ('auto', 'recording'):
         return [recorded.find(path, read)]
     if not path.is_dir():
