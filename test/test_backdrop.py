@@ -209,6 +209,20 @@ def test_a_target_that_has_leapt_is_what_is_as_large_but_nobody_known_for_anothe
     assert piece.box == leapt
 
 
+def test_of_a_target_whose_colours_tell_nothing_no_piece_is_alike(walked):
+    """Its colours, of which none was likely its own, were divided by."""
+    backdrop, body = walked
+
+    def none(image: np.ndarray) -> np.ndarray:
+        return np.zeros(image.shape[:2], np.float32)
+
+    backdrop.see(picture(body, seed=70), body, 0.1)
+    assert backdrop.outline(body, none) is not None
+    backdrop.learn(body)
+    backdrop.see(picture(body, seed=71), body, 0.1)
+    assert backdrop.follow(body, none) is None
+
+
 def test_a_speck_beyond_what_the_target_covered_at_first_does_not_widen_its_box():
     """The box grew to it, and held what it covered from being learned."""
     backdrop = Backdrop(picture(BODY), BODY)

@@ -255,7 +255,7 @@ class Backdrop:
         Returns:
             None where there is no such piece, or somebody else is in it.
         """
-        if not self._fill:
+        if not self._fill or not self._likely:
             return None
         areas, whole = self._pieces.areas, max(1.0, self._fill * box.area)
         was = int(np.count_nonzero(self._was))
