@@ -516,3 +516,14 @@ def test_the_camera_of_a_bag_can_be_named(
     capsys.readouterr()
     assert main([*words, '--report', str(tmp_path / 'report')]) == 2
     assert 'has no topic /other: give another as --color-topic' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('role', ['color', 'depth', 'info'])
+def test_a_topic_named_for_what_is_no_bag_is_refused(tmp_path: Path, role: str) -> None:
+    """It was passed over, and the figures were of another camera than the command said."""
+    folder = tmp_path / 'walk'
+    assert main(['simulate', str(folder), '--size', '160x90', '--duration', '0.2']) == 0
+    options = DatasetOptions(**{f'{role}_topic': '/other'})
+    for source in ('sim:normal', str(folder)):
+        with pytest.raises(DatasetError, match=f'leave --{role}-topic /other out'):
+            open_dataset(source, options)

@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.evaluation.datasets import (
     vot,
 )
 from rgbd_kcf_tracker.evaluation.datasets.base import (
+    BROKEN,
     Opened,
     Sample,
     Sequence,
@@ -119,11 +120,23 @@ def open_dataset(text: str, options: DatasetOptions | None = None) -> list[Seque
                 'groundtruth_rect.txt (OTB), color/ with groundtruth.txt (VOT, CDTB, DepthTrack), '
                 'frames.mat (Princeton) or bags'
             )
+    _refuse_topics(found, chosen)
     if chosen.names:
         found = [s for s in found if any(name in s.name for name in chosen.names)]
         if not found:
             raise DatasetError(f'{text} holds no sequence named {" or ".join(chosen.names)}')
     return found
+
+
+def _refuse_topics(found: list[Sequence], options: DatasetOptions) -> None:
+    for role in ('color', 'depth', 'info'):
+        topic = getattr(options, f'{role}_topic')
+        for sequence in found:
+            if topic is not None and sequence.kind not in (recorded.RECORDING, BROKEN):
+                raise DatasetError(
+                    f'{sequence.name} is no bag and has no topics: leave --{role}-topic {topic} '
+                    'out (--no-depth gives colour alone)'
+                )
 
 
 def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
@@ -149,7 +162,7 @@ def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
         depth_topic=options.depth_topic,
         info_topic=options.info_topic,
     )
-    if recorded.is_sequence(path) and kind in ('auto', 'recording'):
+    if recorded.is_sequence(path) and kind in ('auto', recorded.RECORDING):
         return [recorded.find(path, read)]
     if not path.is_dir():
         return []

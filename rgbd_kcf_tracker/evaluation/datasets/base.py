@@ -27,6 +27,8 @@ CLEAR_FRACTION = 0.5
 
 EVERYONE = 'everyone'
 """Kind of a sequence in which everyone is followed, instead of one target."""
+BROKEN = 'broken'
+"""Kind of a sequence that cannot be read."""
 
 
 class UnreadableError(DatasetError):
@@ -143,7 +145,7 @@ class Sequence:
 def broken(path: Path, reason: str) -> Sequence:
     """A sequence that cannot be read: it fails when it is run, and ends no other."""
     return Sequence(
-        path.name, path.parent.name, 'broken', functools.partial(_fail, reason), reason, path=path
+        path.name, path.parent.name, BROKEN, functools.partial(_fail, reason), reason, path=path
     )
 
 

@@ -15,6 +15,8 @@ from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 
 SUFFIXES = ('.mcap', '.bag', '.db3')
+RECORDING = 'recording'
+"""Kind of a sequence that is a bag."""
 
 
 def is_sequence(path: Path) -> bool:
@@ -27,7 +29,7 @@ def find(path: Path, options: ReadOptions) -> Sequence:
     return Sequence(
         name=path.stem,
         scenario=group(path),
-        kind='recording',
+        kind=RECORDING,
         open=partial(load, path, options),
         identity=f'recording:{options}',
         content=(path,),
