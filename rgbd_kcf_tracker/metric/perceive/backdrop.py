@@ -168,16 +168,13 @@ class Backdrop:
 
     def learn(self, box: Box) -> None:
         """Take what has not changed for the backdrop, but for the target, which is in ``box``."""
-        within = self._within(box.scaled(MARGIN))
-        mine = self._mine | within
-        self._take(mine, within)
+        mine = self._take(box)
         self._others = self._differs & ~mine
         self._appeared = np.zeros_like(mine)
 
     def miss(self, box: Box) -> None:
         """Take what has not changed for the backdrop; the target, last in ``box``, is hidden."""
-        within = self._within(box.scaled(MARGIN))
-        self._take(self._mine | within, within)
+        self._take(box)
 
     def outline(self, box: Box, posterior: Posterior) -> Outline | None:
         """The target's outline in the last picture.
@@ -204,19 +201,15 @@ class Backdrop:
         if not differs.any():
             return None
         # What goes on behind what the target has covered is a piece of it.
-        joined = body | ~known
-        joined = cv2.morphologyEx(joined.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND)
-        count, labels = cv2.connectedComponents(joined, connectivity=8)
-        areas = np.bincount(labels.ravel(), minlength=count)
-        inside = np.bincount(labels[about].ravel(), minlength=count)
-        inside[0] = 0
+        pieces = _pieces(_closed(body | ~known))
+        inside = pieces.overlap(about)
         if not inside.any():
             return None
-        mine = (inside > 0.5 * areas) & (areas >= SPECK)
+        mine = inside > 0.5 * pieces.areas
         mine[int(np.argmax(inside))] = True
-        body &= mine[labels]
+        body &= pieces.mask(mine)
         # A sliver beyond what is not known is what something that passed has left there.
-        parts = _pieces(cv2.morphologyEx(body.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND) > 0)
+        parts = _pieces(_closed(body))
         body &= parts.mask(parts.areas > SLIVER * np.count_nonzero(body))
         bounds = mask_box(body)
         if bounds is None:
@@ -225,7 +218,7 @@ class Backdrop:
         if self.met:
             return None
         self._mine[:] = False
-        self._mine[part] = cv2.dilate(body.astype(np.uint8), _ROUND) > 0
+        self._mine[part] = _grown(body)
         end = _ended(bounds, b, known)
         told = body & differs
         columns = np.count_nonzero(told, axis=0)
@@ -236,7 +229,7 @@ class Backdrop:
         mostly = area > MOSTLY_TOLD * np.count_nonzero(body)
         if mostly and WHOLE < end.height / b.height < 1 / WHOLE:
             self._told = True
-            self._likely = float(posterior(self._last[part])[told].mean())
+            self._likely = _mean(posterior, self._last[part], told)
             self._fill = area / b.area
         self._share = area / max(1.0, self._fill * b.area)
         return Outline(
@@ -262,7 +255,7 @@ class Backdrop:
         mine = self._pieces.overlap(self._was) > GOES_ON * np.minimum(areas, was)
         if not mine.any():
             about = self._within(box.scaled(COMES_OUT))
-            covered = cv2.dilate((~self._known & about).astype(np.uint8), _ROUND) > 0
+            covered = _grown(~self._known & about)
             mine = self._pieces.overlap(covered | (self._appeared & about)) > 0
             if self._share > LEAPT:
                 larger = areas / whole
@@ -277,29 +270,31 @@ class Backdrop:
         bounds = mask_box(body)
         if bounds is None or np.count_nonzero(body & self._others) > OTHERS * area:
             return None
-        part = self._within_picture(bounds)
-        likely = float(posterior(self._last[part])[body[part]].mean())
         self._body, self._share = body, area / whole
-        return Piece(bounds, self._share, likely / self._likely)
+        return Piece(bounds, self._share, _mean(posterior, self._last, body) / self._likely)
 
     # -- parts ------------------------------------------------------------------------------------
 
     def _part_in_pieces(self, differs: Mask) -> None:
         """Part what differs into pieces, and carry over whose these are."""
-        before = cv2.dilate(self._differs.astype(np.uint8), _ROUND) > 0
+        before = _grown(self._differs)
         pieces = self._pieces = _pieces(differs)
-        self._differs = pieces.mask(np.ones(len(pieces.areas), np.bool_))
+        self._differs = pieces.mask(pieces.areas > 0)
         others = pieces.overlap(self._others) > OTHERS * pieces.areas
         new = (pieces.overlap(before) == 0) & ~pieces.at_edge
         self._appeared = pieces.mask((new | (pieces.overlap(self._appeared) > 0)) & ~others)
         self._others = pieces.mask(others)
         self._was, self._body = self._body, np.zeros_like(self._body)
 
-    def _take(self, mine: Mask, within: Mask) -> None:
+    def _take(self, box: Box) -> Mask:
+        """Learn what has not changed, but for what may be the target's; the latter is returned."""
+        within = self._within(box.scaled(MARGIN))
+        mine = self._mine | within
         self._same[within] = 0
         still = (self._same >= STABLE) & ~mine
         np.copyto(self._colors, self._last, where=still[:, :, None])
         self._known |= still
+        return mine
 
     def _within_picture(self, box: Box) -> tuple[slice, slice]:
         return part_in(self._last.shape, box)
@@ -325,8 +320,7 @@ class Backdrop:
     def _meets(self, body: Mask, others: Mask) -> bool:
         """Whether a piece is the target and somebody else whom it has met."""
         area = int(np.count_nonzero(body))
-        others = cv2.dilate(others.astype(np.uint8), _ROUND) > 0
-        if np.count_nonzero(body & others) > OTHERS * area:
+        if np.count_nonzero(body & _grown(others)) > OTHERS * area:
             self._may_part = PARTED
         if self._may_part and area > GROWN * self._area:
             return True
@@ -350,9 +344,9 @@ class _Pieces:
     areas: npt.NDArray[np.int64]
     at_edge: npt.NDArray[np.bool_]
 
-    def overlap(self, mask: Mask) -> npt.NDArray[np.int64]:
-        """Pixels of each piece in a mask, ``(n,)``."""
-        inside = np.bincount(self.labels[mask], minlength=len(self.areas))
+    def overlap(self, there: Mask | tuple[slice, slice]) -> npt.NDArray[np.int64]:
+        """Pixels of each piece in a mask, or in rows and columns, ``(n,)``."""
+        inside = np.bincount(self.labels[there].ravel(), minlength=len(self.areas))
         return np.where(self.areas > 0, inside, 0)
 
     def mask(self, those: Mask) -> Mask:
@@ -369,6 +363,23 @@ def _pieces(mask: Mask) -> _Pieces:
     areas = np.where(areas >= SPECK, areas, 0)
     areas[0] = 0
     return _Pieces(labels, areas, edge)
+
+
+def _grown(mask: Mask) -> Mask:
+    """A mask and the pixels beside it."""
+    grown: Mask = cv2.dilate(mask.astype(np.uint8), _ROUND) > 0
+    return grown
+
+
+def _closed(mask: Mask) -> Mask:
+    """A mask without gaps of a pixel or two."""
+    closed: Mask = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND) > 0
+    return closed
+
+
+def _mean(posterior: Posterior, image: Image, mask: Mask) -> float:
+    """Mean probability of the pixels of a mask, of which there is one at least."""
+    return float(posterior(image[mask][:, None]).mean())
 
 
 def _ended(outline: Box, box: Box, known: Mask) -> Box:
