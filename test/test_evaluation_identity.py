@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation import identity
 from rgbd_kcf_tracker.evaluation.datasets import Sample
-from rgbd_kcf_tracker.evaluation.datasets.base import Person
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.evaluation.identity import Seen, Sighting, Views, all_pairs, look, pair
 from rgbd_kcf_tracker.evaluation.metrics.separation import balanced_reliability, separation
 from rgbd_kcf_tracker.frame import Frame
@@ -63,8 +63,12 @@ BY_COLOR = Views(
 
 def test_people_who_barely_show_and_regions_are_not_looked_at():
     box = Box(1, 1, 5, 5)
-    people = (Person(1, box), Person(2, box, counts=False), Person(-1, box, counts=False))
-    dark = Sample(picture(0, 1), None, people=(Person(1, box),))
+    people = (
+        Annotation(1, box),
+        Annotation(2, box, counts=False),
+        Annotation(-1, box, counts=False),
+    )
+    dark = Sample(picture(0, 1), None, people=(Annotation(1, box),))
     seen = look('a', [Sample(picture(9, 0), None, people=people), dark], BY_COLOR)
     assert (seen.frames, seen.sightings) == (2, 2)
     assert [(v.person, v.frame, v.what) for v in seen.views] == [(1, 0, 9)]
@@ -75,7 +79,7 @@ def test_each_frame_is_shown_first_also_those_without_people():
     views = Views(lambda frame, box: len(told), BY_COLOR.compare, lambda f: told.append(f.stamp_ns))
     empty, full = (
         Sample(picture(9, 0), None),
-        Sample(picture(9, 1), None, people=(Person(1, Box(1, 1, 5, 5)),)),
+        Sample(picture(9, 1), None, people=(Annotation(1, Box(1, 1, 5, 5)),)),
     )
     found = look('a', [empty, full], views)
     assert told == [0, 1_000_000_000]

@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.simulation import SCENARIOS, SimulatedSequence, kinect2_in
 from rgbd_kcf_tracker.simulation.actors import FacesActor, ball
 from rgbd_kcf_tracker.simulation.build import check_request
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Motion
-from rgbd_kcf_tracker.simulation.people import Pose, random_person
+from rgbd_kcf_tracker.simulation.people import Stance, random_person
 from rgbd_kcf_tracker.simulation.room import Room, box_faces, face
 from rgbd_kcf_tracker.simulation.sensor import Sensor, SensorOptions
 from rgbd_kcf_tracker.simulation.solids import Atlas, Lighting, SolidList, render
@@ -184,13 +184,13 @@ def test_solids_meet_their_equations() -> None:
 
 def test_person_stands_on_the_floor_and_is_as_tall_as_they_are() -> None:
     person, _ = random_person(np.random.default_rng(1))
-    for pose in (Pose(0, 3), Pose(0, 3, phase=1.0, effort=1.0), Pose(0, 3, crouch=1.0)):
+    for pose in (Stance(0, 3), Stance(0, 3, phase=1.0, effort=1.0), Stance(0, 3, crouch=1.0)):
         solids = person.solids(pose)
         low = solids.origin[:, 1] + np.abs(solids.frame[:, 1]).max(axis=1)
         assert -0.08 < low.max() < 0.12  # y is down, the floor is 0
-    height = -person.solids(Pose(0, 3)).origin[:, 1].min()
+    height = -person.solids(Stance(0, 3)).origin[:, 1].min()
     assert 0.85 * person.height < height < 1.02 * person.height
-    crouched = -person.solids(Pose(0, 3, crouch=1.0)).origin[:, 1].min()
+    crouched = -person.solids(Stance(0, 3, crouch=1.0)).origin[:, 1].min()
     assert crouched < 0.65 * person.height
 
 

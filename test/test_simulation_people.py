@@ -15,7 +15,7 @@ from rgbd_kcf_tracker.simulation import SCENARIOS, SimulatedSequence, expand_nam
 from rgbd_kcf_tracker.simulation.actors import VisitorActor
 from rgbd_kcf_tracker.simulation.driving import Robot, drive_behind
 from rgbd_kcf_tracker.simulation.floorplan import FloorPlan, Footprint
-from rgbd_kcf_tracker.simulation.people import Pose, random_person
+from rgbd_kcf_tracker.simulation.people import Stance, random_person
 from rgbd_kcf_tracker.simulation.walking import Away, Go, Stay, Walker, rehearse
 
 SMALL = (160, 120)
@@ -224,7 +224,7 @@ def test_target_alone_is_person_1() -> None:
 
 def test_sitting_is_at_the_height_of_a_chair() -> None:
     person, _ = random_person(np.random.default_rng(3))
-    standing, sitting = (person.solids(Pose(0, 3, sit=s)) for s in (0.0, 1.0))
+    standing, sitting = (person.solids(Stance(0, 3, sit=s)) for s in (0.0, 1.0))
     top = [-float(s.origin[:, 1].min()) for s in (standing, sitting)]
     assert 0.65 * top[0] < top[1] < 0.82 * top[0]
     low = sitting.origin[:, 1] + np.abs(sitting.frame[:, 1]).max(axis=1)
@@ -258,13 +258,13 @@ def test_walkers_keep_their_plans_and_their_distance() -> None:
     assert [v.stays for v in second] == [False, True]
     assert second[1].start - second[0].end == pytest.approx(3.0, abs=0.11)
     assert 3.0 < second[0].end < 7.0
-    end = first[0].motion.pose(11.0)
+    end = first[0].motion.stance(11.0)
     assert math.dist((end.x, end.z), (2, 2)) < 0.15
     assert end.heading == pytest.approx(1.0, abs=0.2)
-    last = third[0].motion.pose(11.0)
+    last = third[0].motion.stance(11.0)
     assert math.dist((last.x, last.z), (0, 5)) < 0.15
     for t in np.arange(0, 12, 0.05):
-        poses = [v.motion.pose(t) for each in (first, second, third) for v in each
+        poses = [v.motion.stance(t) for each in (first, second, third) for v in each
                  if v.start <= t <= v.end]  # fmt: skip
         for a, b in combinations(poses, 2):
             assert math.dist((a.x, a.z), (b.x, b.z)) > 0.33
@@ -278,5 +278,5 @@ def test_two_who_block_a_doorway_squeeze_through() -> None:
         Walker((0, 5), 0.0, (Go((0, 1)),), 1.0, 1.4),
     ]
     one, other = rehearse(walkers, plan, 20.0)
-    assert one[0].motion.pose(19.9).z == pytest.approx(5, abs=0.15)
-    assert other[0].motion.pose(19.9).z == pytest.approx(1, abs=0.15)
+    assert one[0].motion.stance(19.9).z == pytest.approx(5, abs=0.15)
+    assert other[0].motion.stance(19.9).z == pytest.approx(1, abs=0.15)

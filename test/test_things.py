@@ -41,7 +41,7 @@ def room(turns: Moments) -> Moments:
 
 def test_what_the_camera_turns_away_from_is_nothing_else(turns: Moments):
     """Its neighbours and the table were the thing, half of the time with scores of 0.9 and more."""
-    moments, total = turns[1], bench.Tally()
+    moments, total = turns[1], bench.Tracked()
     for number in moments[0].truths:
         truths = [moment.truths[number] for moment in moments]
         clear = (i for i, truth in enumerate(truths) if truth.visible_fraction >= bench.BEGIN)
@@ -152,9 +152,9 @@ def test_a_thing_is_followed_both_ways_in_time(room: Moments, monkeypatch: pytes
     frames = [moment.frame for moment in room[1]]
     seen: list[list[int]] = []
 
-    def follow(shown: Sequence[Frame], wheres: Sequence[object], box: Box) -> bench.Tally:
+    def follow(shown: Sequence[Frame], wheres: Sequence[object], box: Box) -> bench.Tracked:
         seen.append([frame.stamp_ns for frame in shown])
-        return bench.Tally(tracks=1)
+        return bench.Tracked(tracks=1)
 
     monkeypatch.setattr(bench, 'follow', follow)
     thing = bench.Thing('mug', 12, Box(0, 0, 10, 10))

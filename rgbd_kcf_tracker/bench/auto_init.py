@@ -27,7 +27,7 @@ import numpy as np
 from rgbd_kcf_tracker.cli.common import parse_intrinsics
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
-from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, with_intrinsics
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, with_intrinsics
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
 from rgbd_kcf_tracker.frame import Frame
@@ -66,7 +66,7 @@ DURATION_S = 8.0
 
 
 @dataclass(slots=True)
-class Tally:
+class Chosen:
     """What came of one kind of scenes.
 
     Attributes:
@@ -86,7 +86,7 @@ class Tally:
     found: int = 0
     seconds: list[float] = dataclasses.field(default_factory=list)
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: Chosen) -> None:
         """Count another one's scenes too."""
         for field in dataclasses.fields(self):
             total = getattr(self, field.name) + getattr(other, field.name)
@@ -113,9 +113,9 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def judge(samples: Iterable[Sample], settings: NodeParameters) -> Tally:
+def judge(samples: Iterable[Sample], settings: NodeParameters) -> Chosen:
     """Let auto_init choose from frame to frame, and hold each choice against the truth."""
-    tally, choose = Tally(scenes=1), AutoInit(settings)
+    tally, choose = Chosen(scenes=1), AutoInit(settings)
     begun: int | None = None
     waiting = True
     for sample in samples:
@@ -141,7 +141,7 @@ def judge(samples: Iterable[Sample], settings: NodeParameters) -> Tally:
     return tally
 
 
-def _ignored(box: Box, person: Person) -> bool:
+def _ignored(box: Box, person: Annotation) -> bool:
     """Whether a choice lies in a region, or on somebody, of whom the truth says nothing."""
     if person.id >= 0:
         return not person.counts and box.iou(person.box) >= RIGHT / 2
@@ -150,7 +150,7 @@ def _ignored(box: Box, person: Person) -> bool:
     )
 
 
-def _in_range(person: Person, frame: Frame, settings: NodeParameters) -> bool:
+def _in_range(person: Annotation, frame: Frame, settings: NodeParameters) -> bool:
     if person.id < 0 or not person.counts or (person.share or 1.0) < CLEAR:
         return False
     inside = person.box.clipped(frame.width, frame.height)
@@ -188,7 +188,7 @@ def rendered(scenario: str, seed: int, change: str) -> Iterator[Sample]:
     )
     for number, moment in enumerate(sequence):
         present = tuple(
-            Person(who, truth.shown, body=truth.body, share=truth.visible_fraction)
+            Annotation(who, truth.shown, body=truth.body, share=truth.visible_fraction)
             for who, truth in moment.truths.items()
             if truth.shown is not None
         )
@@ -251,7 +251,7 @@ def recorded(text: str, fps: float, camera: Intrinsics | None, empty: bool) -> I
 # --- the command -------------------------------------------------------------------------------
 
 
-def measured(args: argparse.Namespace) -> tuple[Tally, list[tuple[Cell, ...]]]:
+def measured(args: argparse.Namespace) -> tuple[Chosen, list[tuple[Cell, ...]]]:
     """What was chosen in all, and a row for each kind of scene."""
     settings = NodeParameters(auto_init=True)
     seeds = parse_seeds(args.seeds) if args.seeds else []
@@ -267,9 +267,9 @@ def measured(args: argparse.Namespace) -> tuple[Tally, list[tuple[Cell, ...]]]:
         ]
     kinds['recorded people'] = [(f, recorded(f, args.fps, camera, False)) for f in args.people]
     kinds['recorded, empty'] = [(f, recorded(f, args.fps, camera, True)) for f in args.empty]
-    total, rows = Tally(), []
+    total, rows = Chosen(), []
     for kind, scenes in kinds.items():
-        tally = Tally()
+        tally = Chosen()
         for name, samples in scenes:
             one = judge(samples, settings)
             tally.add(one)

@@ -123,7 +123,7 @@ class Where:
 
 
 @dataclass(slots=True)
-class Tally:
+class Tracked:
     """What came of some tracks.
 
     Attributes:
@@ -142,7 +142,7 @@ class Tally:
     sure: int = 0
     sure_wrong: int = 0
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: Tracked) -> None:
         """Count another one's tracks too."""
         for field in dataclasses.fields(self):
             total = getattr(self, field.name) + getattr(other, field.name)
@@ -168,7 +168,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) -> Tally:
+def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) -> Tracked:
     """Follow what a box shows in the first frame through the others.
 
     Args:
@@ -176,7 +176,7 @@ def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) ->
         wheres: the truth about each; None where nothing is judged.
         box: of the thing, pixels.
     """
-    tally, tracker = Tally(tracks=1), create_tracker('metric')
+    tally, tracker = Tracked(tracks=1), create_tracker('metric')
     tracker.start(frames[0], box)
     for frame, where in zip(frames[1:], wheres[1:], strict=True):
         track = tracker.update(frame)
@@ -196,7 +196,7 @@ def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) ->
 
 def both_ways(
     frames: Sequence[Frame], wheres: Sequence[Where | None], thing: Thing, stride: int
-) -> Iterator[tuple[str, Tally]]:
+) -> Iterator[tuple[str, Tracked]]:
     """Follow a thing forwards and backwards in time; of each direction its name and what came."""
     ends = {'forwards': range(thing.frame, len(frames), stride),
             'backwards': range(thing.frame, -1, -stride)}  # fmt: skip
@@ -396,11 +396,11 @@ def exact(truth: SimulatedTruth) -> Where:
 # --- the command -------------------------------------------------------------------------------
 
 
-def measured(args: argparse.Namespace) -> tuple[Tally, list[tuple[Cell, ...]]]:
+def measured(args: argparse.Namespace) -> tuple[Tracked, list[tuple[Cell, ...]]]:
     """What came of all, and a row for each stride."""
     things = read_things(args.things) if args.recording else []
     camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
-    tallies = {stride: Tally() for stride in args.strides}
+    tallies = {stride: Tracked() for stride in args.strides}
 
     def count(frames: list[Frame], thing: Thing, wheres: list[Where | None], name: str) -> None:
         for stride, total in tallies.items():
@@ -421,7 +421,7 @@ def measured(args: argparse.Namespace) -> tuple[Tally, list[tuple[Cell, ...]]]:
         frames, found = simulated(seed)
         for thing, where in found:
             count(frames, thing, where, f'room {seed}')
-    all_ = Tally()
+    all_ = Tracked()
     for tally in tallies.values():
         all_.add(tally)
     rows = [tally.row(f'every {stride}') for stride, tally in tallies.items()]

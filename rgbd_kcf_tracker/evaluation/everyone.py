@@ -24,7 +24,7 @@ import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation import boxfiles, passes
 from rgbd_kcf_tracker.evaluation.contenders import Contender
-from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample, Sequence
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
 from rgbd_kcf_tracker.evaluation.passes import Pass
@@ -127,7 +127,7 @@ class _Truth:
     def __init__(self) -> None:
         self.numbers: list[int] = []
         self.stamps_ns: list[int] = []
-        self._people: list[tuple[int, Person]] = []
+        self._people: list[tuple[int, Annotation]] = []
 
     def feed(self, sample: Sample) -> None:
         self._people += [(len(self.numbers), person) for person in sample.people]

@@ -24,7 +24,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation.contenders import Contender
-from rgbd_kcf_tracker.evaluation.datasets.base import Person, Sample
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Pass, run
 from rgbd_kcf_tracker.evaluation.speed import RATE, SEED, Setting
 from rgbd_kcf_tracker.simulation.build import kinect2_intrinsics
@@ -123,7 +123,7 @@ def _samples(scene: SimulatedSequence, depth: bool) -> Iterator[Sample]:
     for simulated in scene:
         frame = simulated.frame if depth else dataclasses.replace(simulated.frame, depth=None)
         people = tuple(
-            Person(number, truth.visible)
+            Annotation(number, truth.visible)
             for number, truth in simulated.truths.items()
             if truth.visible is not None
         )

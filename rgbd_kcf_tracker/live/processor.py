@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.live.places import CameraPlaces, Places
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
-from rgbd_kcf_tracker.live.timeline import Moment, Timeline
+from rgbd_kcf_tracker.live.timeline import Instant, Timeline
 from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
 from rgbd_kcf_tracker.recordings.images import (
@@ -270,7 +270,7 @@ class Processor:
             self._fault('empty_depth', 'depth image has no reading at all: is the sensor covered?')
         return depth
 
-    def _notice(self, header: Any, moment: Moment) -> None:
+    def _notice(self, header: Any, moment: Instant) -> None:
         self._steady += 1
         if moment.jumped:
             # A bag that loops is no fault: it is said once, and counted.

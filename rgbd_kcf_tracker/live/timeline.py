@@ -25,7 +25,7 @@ LEAST_STEP_NS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class Instant:
     """One image's place in time.
 
     Attributes:
@@ -48,8 +48,8 @@ class Timeline:
         self._arrival = 0
         self._before_jump: int | None = None
 
-    def advance(self, stamp_ns: int, arrival_ns: int) -> Moment:
-        """The moment of an image.
+    def advance(self, stamp_ns: int, arrival_ns: int) -> Instant:
+        """The instant of an image.
 
         Args:
             stamp_ns: of its header.
@@ -57,7 +57,7 @@ class Timeline:
         """
         if self._time is None:
             self._time, self._stamp, self._arrival = stamp_ns, stamp_ns, arrival_ns
-            return Moment(stamp_ns)
+            return Instant(stamp_ns)
         step = stamp_ns - self._stamp
         waited = min(max(arrival_ns - self._arrival, LEAST_STEP_NS), LARGEST_STEP_NS)
         jumped = restarted = False
@@ -72,7 +72,7 @@ class Timeline:
             self._before_jump = None  # two images on the new course: it is the course now
         self._time += step
         self._stamp, self._arrival = stamp_ns, arrival_ns
-        return Moment(self._time, jumped, restarted)
+        return Instant(self._time, jumped, restarted)
 
 
 class StampRepair:

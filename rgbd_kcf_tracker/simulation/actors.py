@@ -36,7 +36,7 @@ class PersonActor:
 
     def draw(self, t: float, view: Viewpoint, window: Window, shade: bool) -> Layer | None:
         """See `Actor`."""
-        solids = self.person.solids(self.motion.pose(t), self.parts)
+        solids = self.person.solids(self.motion.stance(t), self.parts)
         return render(solids.moved(view.rotation, view.place), self.person.atlas, view.camera,
                       window, view.light, shade)  # fmt: skip
 
@@ -76,11 +76,11 @@ class VisitorActor:
         """See `Actor`; while away, where they were last or will be first."""
         motion = self._motion(t)
         low = 1 - 0.3 * motion.value('sit', t)
-        pose = motion.pose(t)
-        back = 0.2 * pose.sit * self.person.height
+        stance = motion.stance(t)
+        back = 0.2 * stance.sit * self.person.height
         return np.array([
-            pose.x - back * math.sin(pose.heading), -0.55 * low * self.person.height,
-            pose.z + back * math.cos(pose.heading),
+            stance.x - back * math.sin(stance.heading), -0.55 * low * self.person.height,
+            stance.z + back * math.cos(stance.heading),
         ])  # fmt: skip
 
     def shadow(self, t: float) -> float:

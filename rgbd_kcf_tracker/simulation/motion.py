@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.simulation.people import Pose
+from rgbd_kcf_tracker.simulation.people import Stance
 
 Vector = npt.NDArray[np.float64]
 Keys = Sequence[tuple[float, float]]
@@ -48,7 +48,7 @@ class Motion:
         heading: ``(seconds, radians)``; without it the figure looks where it goes.
         stride: metres per two steps.
         corner_s: smoothing of corners and of starting and stopping.
-        channels: further keys by `Pose` field (``crouch``, ``spread``, ``reach``, ``sit``), or
+        channels: further keys by `Stance` field (``crouch``, ``spread``, ``reach``, ``sit``), or
             ``lift``.
         phase: of the gait at the start.
     """
@@ -92,10 +92,10 @@ class Motion:
         i = int(place)
         return float(table[i] + (place - i) * (table[i + 1] - table[i]))
 
-    def pose(self, t: float) -> Pose:
-        """The whole pose at ``t`` seconds."""
+    def stance(self, t: float) -> Stance:
+        """The whole stance at ``t`` seconds."""
         v = self.value
-        return Pose(
+        return Stance(
             v('x', t), v('z', t), v('heading', t), v('phase', t), v('effort', t), v('crouch', t),
             v('spread', t), v('reach', t), v('sit', t),
         )  # fmt: skip

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""People: random bodies and clothes, and the pose of a walking, turning, crouching figure.
+"""People: random bodies and clothes, and the stance of a walking, turning, crouching figure.
 
 World frame: x right, y down, z forward, metres; the floor is y = 0. A heading of 0 looks towards -z
 (at the camera), and grows towards +x.
@@ -35,7 +35,7 @@ Vector = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
+class Stance:
     """Where a person stands and what they do, at one moment.
 
     Attributes:
@@ -85,13 +85,13 @@ class Person:
     backpack: bool = False
     bag: str = ''
 
-    def solids(self, pose: Pose, parts: str = 'all') -> Solids:
+    def solids(self, stance: Stance, parts: str = 'all') -> Solids:
         """The figure in the world frame; ``parts`` is ``'all'``, ``'head'`` or ``'body'``."""
-        return _Figure(self, pose).build(parts)
+        return _Figure(self, stance).build(parts)
 
-    def hand(self, pose: Pose) -> Vector:
+    def hand(self, stance: Stance) -> Vector:
         """Where the right hand is, world frame."""
-        return _Figure(self, pose).arm(1)[2]
+        return _Figure(self, stance).arm(1)[2]
 
 
 def random_person(
@@ -115,37 +115,39 @@ def random_person(
 
 
 class _Figure:
-    """Joint positions of a person in a pose, then the solids around them."""
+    """Joint positions of a person in a stance, then the solids around them."""
 
-    def __init__(self, person: Person, pose: Pose) -> None:
-        self.person, self.pose = person, pose
-        sin, cos = math.sin(pose.heading), math.cos(pose.heading)
+    def __init__(self, person: Person, stance: Stance) -> None:
+        self.person, self.stance = person, stance
+        sin, cos = math.sin(stance.heading), math.cos(stance.heading)
         self.forward = np.array([sin, 0.0, -cos])
         self.side = np.array([cos, 0.0, sin])  # the person's left
         self.up = np.array([0.0, -1.0, 0.0])
         h = person.height
         self.unit = h
         self.width = h * person.build
-        amplitude = 0.48 * min(pose.effort, 1.5)
-        swing = math.sin(pose.phase)
+        amplitude = 0.48 * min(stance.effort, 1.5)
+        swing = math.sin(stance.phase)
         self.legs = []
         for sign in (-1, 1):
-            thigh = -sign * amplitude * swing + 1.5 * pose.crouch + 1.5 * pose.sit
-            knee = 0.12 * min(pose.effort, 1) + 1.9 * amplitude * max(
-                0.0, math.cos(pose.phase) * float(-sign)
+            thigh = -sign * amplitude * swing + 1.5 * stance.crouch + 1.5 * stance.sit
+            knee = 0.12 * min(stance.effort, 1) + 1.9 * amplitude * max(
+                0.0, math.cos(stance.phase) * float(-sign)
             )
-            knee += 2.55 * pose.crouch + 1.5 * pose.sit
+            knee += 2.55 * stance.crouch + 1.5 * stance.sit
             self.legs.append((thigh, thigh - knee))
         length = 0.245 * h
         reach = max(length * (math.cos(a) + math.cos(b)) for a, b in self.legs)
-        self.lean = 0.05 * pose.effort + 0.55 * pose.crouch + 0.35 * math.sin(math.pi * pose.sit)
+        self.lean = (
+            0.05 * stance.effort + 0.55 * stance.crouch + 0.35 * math.sin(math.pi * stance.sit)
+        )
         self.trunk = math.cos(self.lean) * self.up + math.sin(self.lean) * self.forward
-        floor = np.array([pose.x, 0.0, pose.z])
-        self.pelvis = floor + self.up * (reach + 0.04 * h) - self.forward * 0.2 * h * pose.crouch
-        if pose.sit > 0:
-            self.pelvis = self.pelvis - self.forward * length * math.sin(1.5 * pose.sit)
+        floor = np.array([stance.x, 0.0, stance.z])
+        self.pelvis = floor + self.up * (reach + 0.04 * h) - self.forward * 0.2 * h * stance.crouch
+        if stance.sit > 0:
+            self.pelvis = self.pelvis - self.forward * length * math.sin(1.5 * stance.sit)
         self.chest = self.pelvis + self.trunk * 0.29 * h
-        twist = 0.18 * min(pose.effort, 1.2) * swing
+        twist = 0.18 * min(stance.effort, 1.2) * swing
         self.shoulder_side = math.cos(twist) * self.side + math.sin(twist) * self.forward
 
     def _sagittal(self, angle: float) -> Vector:
@@ -153,19 +155,19 @@ class _Figure:
 
     def arm(self, sign: int) -> tuple[Vector, Vector, Vector, Vector]:
         """Shoulder, elbow and wrist of the left (-1) or right (1) arm, and its local side axis."""
-        pose, h = self.pose, self.unit
+        stance, h = self.stance, self.unit
         shoulder = self.chest + self.shoulder_side * (-sign * 0.105 * self.width)
-        swing = 0.55 * min(pose.effort, 1.6) * math.sin(pose.phase) * sign
-        bend = 0.15 + 0.35 * min(pose.effort, 2.0)
-        reach = pose.reach if sign > 0 else 0.0
-        swing = (1 - reach) * swing + 0.9 * reach + 0.4 * pose.crouch
+        swing = 0.55 * min(stance.effort, 1.6) * math.sin(stance.phase) * sign
+        bend = 0.15 + 0.35 * min(stance.effort, 2.0)
+        reach = stance.reach if sign > 0 else 0.0
+        swing = (1 - reach) * swing + 0.9 * reach + 0.4 * stance.crouch
         bend = (1 - reach) * bend + 1.2 * reach
-        away = 0.1 + 1.45 * pose.spread
+        away = 0.1 + 1.45 * stance.spread
         out = self.shoulder_side * float(-sign)
         level = math.cos(away) * -self.up + math.sin(away) * out
-        turn = math.cos(away) if pose.spread > 0 else 1.0
+        turn = math.cos(away) if stance.spread > 0 else 1.0
         upper = math.cos(swing * turn) * level + math.sin(swing * turn) * self.forward
-        fore_angle = swing * turn + bend * (1 - 0.8 * pose.spread)
+        fore_angle = swing * turn + bend * (1 - 0.8 * stance.spread)
         fore = math.cos(fore_angle) * level + math.sin(fore_angle) * self.forward
         elbow = shoulder + upper * 0.17 * h
         axis = math.cos(away) * out + math.sin(away) * self.up
@@ -228,7 +230,7 @@ class _Figure:
         hip = -self.trunk * 0.058 * h
         out.ellipsoid(self.pelvis - self.trunk * 0.005 * h, hip, 0.092 * w, 0.066 * w, THIGH, side)
         if self.person.skirt:
-            low = self.pelvis + self._sagittal(self.pose.crouch) * 0.24 * h
+            low = self.pelvis + self._sagittal(self.stance.crouch) * 0.24 * h
             out.limb(self.pelvis, low, 0.088 * w, 0.12 * w, EXTRA, side, 0.75)
         if self.person.backpack:
             pack = self.chest - self.trunk * 0.09 * h - self.forward * 0.085 * w
@@ -257,7 +259,7 @@ class _Figure:
         out.limb(hip, knee, 0.05 * w, 0.036 * w, THIGH, side)
         out.ellipsoid(knee, shin * 0.036 * w, 0.036 * w, 0.037 * w, SHIN, side)
         out.limb(knee, ankle, 0.035 * w, 0.024 * w, SHIN, side)
-        pitch = 0.5 * shin_angle if self.pose.crouch < 0.3 else 0.0
+        pitch = 0.5 * shin_angle if self.stance.crouch < 0.3 else 0.0
         toe = math.cos(pitch) * self.forward + math.sin(pitch) * self.up
         foot = ankle - self.up * 0.012 * h + toe * 0.045 * h
         sole = np.cross(toe, side)

@@ -51,9 +51,9 @@ class _Diary:
         self.now += 1.15 * math.dist(self.place, to) / self.speed + 0.2
         self.place = to
 
-    def stay(self, seconds: float, facing: float | None = None, **pose: float) -> None:
+    def stay(self, seconds: float, facing: float | None = None, **stance: float) -> None:
         """Stand or sit there."""
-        self.actions.append(Stay(seconds, facing, **pose))
+        self.actions.append(Stay(seconds, facing, **stance))
         self.now += seconds
 
     def look_about(self, seconds: float) -> None:
@@ -107,10 +107,10 @@ class _Diary:
         self.start = by.outside
         self.come_back(by, at)
 
-    def wait_until(self, time: float, facing: float | None = None, **pose: float) -> None:
+    def wait_until(self, time: float, facing: float | None = None, **stance: float) -> None:
         """Stand there until about a time."""
         if time > self.now:
-            self.stay(time - self.now, facing, **pose)
+            self.stay(time - self.now, facing, **stance)
 
     def walker(self) -> Walker:
         """With the plan as it is now."""

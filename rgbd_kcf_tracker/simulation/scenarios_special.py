@@ -235,9 +235,9 @@ def carried_mug(stage: Stage) -> World:
     actor = stage.walk(person, way, heading, {'reach': [(0, 1.0)]})
 
     def place(t: float) -> Vector:
-        pose = actor.motion.pose(t)
-        ahead = np.array([math.sin(pose.heading), 0.0, -math.cos(pose.heading)])
-        held: Vector = person.hand(pose) + ahead * 0.1 + np.array([0, 0.02, 0])
+        stance = actor.motion.stance(t)
+        ahead = np.array([math.sin(stance.heading), 0.0, -math.cos(stance.heading)])
+        held: Vector = person.hand(stance) + ahead * 0.1 + np.array([0, 0.02, 0])
         return held
 
     cup = mug(stage.rng, place, lambda t: 2.2 + actor.motion.value('heading', t))

@@ -33,7 +33,7 @@ from rgbd_kcf_tracker.view.commands import MOST_COMMANDS, Command
 from rgbd_kcf_tracker.view.controller import describe_variants, yaml_of
 from rgbd_kcf_tracker.view.known import Known, known_by
 from rgbd_kcf_tracker.view.showing import Detail, Seen, figures, show
-from rgbd_kcf_tracker.view.targets import Targets, follows_everyone
+from rgbd_kcf_tracker.view.targets import PageTargets, follows_everyone
 
 SPEEDS = (0.1, 8.0)
 SHOWN_HZ = 20.0
@@ -106,7 +106,7 @@ class Player:
         self._passed: dict[int, Passed] = {}
         self._everyone = everyone
         self._numbers = itertools.count(1)
-        self._targets = Targets(variant, self._parameters, everyone, self._numbers)
+        self._targets = PageTargets(variant, self._parameters, everyone, self._numbers)
         self._names: dict[int, str] = {}
         self._front = start - 1  # the last frame that the trackers have seen
         self._shown = start
@@ -458,7 +458,7 @@ class Player:
                     starts[key] = earlier
                 if key in starts and earlier <= warm:
                     break
-        self._targets = Targets(self._variant, self._parameters, self._everyone, self._numbers)
+        self._targets = PageTargets(self._variant, self._parameters, self._everyone, self._numbers)
         self._forget_after(number)
         self._known.clear()
         begin = min([warm, *starts.values()])

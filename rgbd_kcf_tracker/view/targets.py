@@ -30,7 +30,7 @@ def follows_everyone(variant: str) -> bool:
     return TargetSet(variant).metric is not None
 
 
-class Targets:
+class PageTargets:
     """A :class:`~rgbd_kcf_tracker.targets.TargetSet` with the ids of the page.
 
     Args:

@@ -36,7 +36,7 @@ class UnreadableError(DatasetError):
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class Annotation:
     """Somebody in a frame.
 
     Attributes:
@@ -76,7 +76,7 @@ class Sample:
     body: Box | None = None
     fraction: float | None = None
     judged: bool = True
-    people: tuple[Person, ...] = ()
+    people: tuple[Annotation, ...] = ()
     number: int = 0
     position: tuple[float, float, float] | None = None
     velocity: tuple[float, float, float] | None = None

@@ -20,8 +20,8 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import (
     EVERYONE,
+    Annotation,
     Opened,
-    Person,
     Sample,
     Sequence,
     group,
@@ -42,7 +42,7 @@ IMAGE_FOLDERS = ('rgb', 'color', 'img1', 'img')
 _CHALLENGE = Path('gt') / 'gt.txt'
 _INFO = 'seqinfo.ini'
 
-People = dict[int, list[Person]]
+People = dict[int, list[Annotation]]
 """Who is in each frame that has anybody, by index from 0."""
 
 
@@ -121,7 +121,7 @@ def _from_mot(path: Path, beside: Path, images: tuple[Path, ...], folder: Path) 
     ):
         shown = None if share != share else float(share)
         body = bodies[int(who)][frame]
-        person = Person(int(who), rows.box(row), bool(score > 0), body, shown)
+        person = Annotation(int(who), rows.box(row), bool(score > 0), body, shown)
         people[int(frame)].append(person)
     return people
 
@@ -144,7 +144,7 @@ def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> Pe
             if box is not None:
                 share = None if shares is None else shares[frame]
                 counts = share is None or share >= BARELY_VISIBLE
-                people[frame].append(Person(who, box, counts, bodies[frame], share))
+                people[frame].append(Annotation(who, box, counts, bodies[frame], share))
     return people
 
 

@@ -12,8 +12,8 @@ from functools import partial
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import (
     EVERYONE,
+    Annotation,
     Opened,
-    Person,
     Sample,
     Sequence,
 )
@@ -133,7 +133,7 @@ def load_everyone(
     def samples() -> Iterator[Sample]:
         for number, moment in enumerate(scene):
             people = tuple(
-                Person(
+                Annotation(
                     who, truth.shown, truth.visible_fraction >= BARELY_VISIBLE, truth.body,
                     truth.visible_fraction,
                 )
