@@ -25,7 +25,7 @@ SOURCES = sorted((ROOT / PACKAGE).rglob('*.py'))
 # A layer imports from its own and from those below it; what stands beside another in one layer does
 # not know of it, but for SIDEWAYS.
 LAYERS = (
-    ('errors', 'lazy'),
+    ('arrays', 'errors', 'lazy'),
     ('extras', 'parameters', 'lens', 'pose'),
     ('geometry',),
     ('frame',),
@@ -60,7 +60,7 @@ ROS_MODULES = {
     'lifecycle_msgs', 'rosgraph_msgs', 'rcl_interfaces', 'builtin_interfaces',
 }  # fmt: skip
 LEAN = {
-    'errors', 'lazy', 'parameters', 'lens', 'geometry', 'frame', 'track',
+    'arrays', 'errors', 'lazy', 'parameters', 'lens', 'geometry', 'frame', 'track',
     'features', 'metric', 'thesis', 'variants', 'targets', 'insight',
 }  # fmt: skip
 # bench/ is made of nodes too: a camera, a listener, a recorder.

@@ -21,11 +21,11 @@ from typing import Protocol
 import numpy as np
 
 import rgbd_kcf_tracker
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation import boxfiles, passes
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, Sequence
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
 from rgbd_kcf_tracker.evaluation.passes import Pass
 from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
@@ -64,7 +64,7 @@ class Followed:
     """
 
     truth: Sightings
-    bodies: Array | None
+    bodies: FloatArray | None
     tracks: Sightings
     milliseconds: tuple[float, ...] = ()
 
@@ -137,7 +137,7 @@ class _Truth:
     def sightings(self) -> Sightings:
         return self._rows([p.box.as_tuple() for _, p in self._people])
 
-    def bodies(self) -> Array | None:
+    def bodies(self) -> FloatArray | None:
         if all(p.body is None for _, p in self._people):
             return None
         nothing = (np.nan,) * 4

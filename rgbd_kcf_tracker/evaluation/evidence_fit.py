@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample, at_rate, with_intrinsics
@@ -33,8 +34,6 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, Evidence
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.targets import MetricTracker
-
-FloatArray = npt.NDArray[np.float64]
 
 RIGHT, WRONG = 0.5, 0.3
 """Overlaps from which a candidate is the target, and below which it is not; between, left out."""

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.evaluation.metrics.separation import Separation, separation
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
@@ -99,7 +99,7 @@ class Pairs:
     seen: tuple[Seen, ...]
     left: tuple[Sighting, ...]
     right: tuple[Sighting, ...]
-    probability: Array
+    probability: FloatArray
 
     @property
     def same(self) -> Mask:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.evaluation.metrics import Measures, confusion, mean
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.metrics.confusion import Counts
 from rgbd_kcf_tracker.evaluation.perframe import Info, Result
 
@@ -48,7 +48,7 @@ class Measured:
             if name == tracker and scenario in (None, self.infos[sequence].scenario)
         )
 
-    def values(self, tracker: str, name: str) -> Array:
+    def values(self, tracker: str, name: str) -> FloatArray:
         """One measure of each sequence."""
         found = [getattr(m, name) for (t, _), m in self._measures.items() if t == tracker]
         return np.array(found, np.float64)

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation import boxfiles
 from rgbd_kcf_tracker.evaluation.datasets import otb
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array as Boxes
 from rgbd_kcf_tracker.evaluation.metrics.boxes import as_array, center_error
 from rgbd_kcf_tracker.evaluation.metrics.otb import precision_at_20, precision_curve
 from rgbd_kcf_tracker.evaluation.passes import Notes, OnePass, run
@@ -43,8 +43,8 @@ class Comparison:
     published: float
 
 
-def boxes_of(folder: Path) -> tuple[Boxes, Boxes, Boxes]:
-    """Boxes of our ``kcf``, published and true, ``(n, 4)`` each, in 0-based pixels.
+def boxes_of(folder: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """FloatArray of our ``kcf``, published and true, ``(n, 4)`` each, in 0-based pixels.
 
     Raises:
         DatasetError: where the folder is not as the module's docstring says.

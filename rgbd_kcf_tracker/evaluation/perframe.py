@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path, truth_path
 from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, measure
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place
 from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
 from rgbd_kcf_tracker.evaluation.store import (
@@ -57,7 +57,7 @@ class Result:
     sequence: str
     stamps_ns: tuple[int, ...]
     frames: Comparison
-    fraction: Array
+    fraction: FloatArray
     judged: Mask
 
     @property

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import otb, princeton, vot
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE, Reliability
 from rgbd_kcf_tracker.evaluation.metrics.longterm import LongTerm
 from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Effect
@@ -26,9 +26,9 @@ ERROR_CAP_PX = 150.0
 _ABSENT, _PARTLY = '#c9ccd1', '#eceef1'
 
 
-def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
+def mean_curves(measured: Measured) -> dict[str, dict[str, FloatArray]]:
     """Per tracker the mean curves over sequences: OTB success and precision, Princeton's R."""
-    curves: dict[str, dict[str, Array]] = {}
+    curves: dict[str, dict[str, FloatArray]] = {}
     for tracker in measured.trackers:
         own = [r.counted for r in measured.results if r.tracker == tracker]
         shown = [c for c in own if c.there.any()]
@@ -40,7 +40,7 @@ def mean_curves(measured: Measured) -> dict[str, dict[str, Array]]:
     return curves
 
 
-def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, Array]]) -> bytes:
+def curve_plots(measured: Measured, curves: Mapping[str, Mapping[str, FloatArray]]) -> bytes:
     """Success over IoU, precision over pixels, and Princeton's R over its thresholds."""
     figure = plot_style.figure(12.5, 4.2)
     panels = (
@@ -238,7 +238,7 @@ def sequence_plot(results: Sequence[Result], palette: Mapping[str, str]) -> byte
     return plot_style.png(figure, 90)
 
 
-def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
+def _shade(axes: Axes, seconds: FloatArray, mask: Mask, color: str) -> None:
     if not mask.any():
         return
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
@@ -247,8 +247,8 @@ def _shade(axes: Axes, seconds: Array, mask: Mask, color: str) -> None:
         axes.axvspan(seconds[start] - step / 2, seconds[stop - 1] + step / 2, color=color, lw=0)
 
 
-def _mean(curves: Sequence[Array], size: int) -> Array:
-    mean: Array = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
+def _mean(curves: Sequence[FloatArray], size: int) -> FloatArray:
+    mean: FloatArray = np.mean(curves, axis=0) if curves else np.full(size, np.nan)
     return mean
 
 

@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.recordings.results import HEADER
@@ -40,9 +40,9 @@ TRUTH_HEADER = (
 class Tracks:
     """A tracker's answers to ``N`` frames: boxes ``(N, 4)``, states, scores ``(N,)``."""
 
-    boxes: Array
+    boxes: FloatArray
     states: tuple[str, ...]
-    scores: Array
+    scores: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,9 +58,9 @@ class Truth:
     """
 
     stamps_ns: tuple[int, ...]
-    visible: Array
-    body: Array | None
-    fraction: Array
+    visible: FloatArray
+    body: FloatArray | None
+    fraction: FloatArray
     judged: Mask
 
 

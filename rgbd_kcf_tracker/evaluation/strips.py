@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.jobs import thumbnails_path
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.passes import read_thumbnails
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.images import decode_color_bytes
@@ -35,8 +35,8 @@ def strip(
     folder: Path,
     sequence: str,
     scale: float,
-    truth: Array,
-    boxes: Mapping[str, Array],
+    truth: FloatArray,
+    boxes: Mapping[str, FloatArray],
     palette: Mapping[str, str],
     main: str,
     interesting: npt.NDArray[np.bool_],
@@ -126,7 +126,7 @@ def _montage(tiles: list[Picture]) -> Picture:
     return sheet
 
 
-def _dashed(image: Picture, box: Array) -> None:
+def _dashed(image: Picture, box: FloatArray) -> None:
     if np.isnan(box[0]):
         return
     left, top = int(box[0]), int(box[1])

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 FORMATS = ('princeton', 'vot')
 
 
-def write_princeton(path: Path, boxes: Array) -> None:
+def write_princeton(path: Path, boxes: FloatArray) -> None:
     """One line per frame: ``x1,y1,x2,y2,state``; ``NaN,NaN,NaN,NaN,1`` where the target is hidden.
 
     Corners are those of the box in the data set's coordinates, right and bottom exclusive, so that
@@ -34,8 +34,8 @@ def write_princeton(path: Path, boxes: Array) -> None:
 def write_vot(
     folder: Path,
     sequence: str,
-    boxes: Array,
-    scores: Array,
+    boxes: FloatArray,
+    scores: FloatArray,
     milliseconds: Sequence[float],
     codes: Sequence[int] | None = None,
 ) -> None:

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, truth_path
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import sensitivity
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 from rgbd_kcf_tracker.evaluation.perframe import collect
 from rgbd_kcf_tracker.evaluation.store import read_truth
 from rgbd_kcf_tracker.evaluation.sweep import Axis, Setting
@@ -54,9 +54,9 @@ class Found:
     whole_grid: bool
     default: Setting
     settings: tuple[Setting, ...]
-    tried: Array
+    tried: FloatArray
     finalists: tuple[int, ...]
-    held_out: Array
+    held_out: FloatArray
 
     @property
     def sign(self) -> float:
@@ -75,7 +75,7 @@ def scores(
     settings: Items[Setting],
     options: RunOptions,
     measure: str,
-) -> Array:
+) -> FloatArray:
     """``(S, Q)`` scores of settings on sequences from what their runs left; NaN where one failed.
 
     Raises:
@@ -107,7 +107,7 @@ def frames(folder: Path, sequences: Items[Sequence]) -> dict[str, int]:
     return counts
 
 
-def best(tried: Array, count: int, sign: float) -> tuple[int, ...]:
+def best(tried: FloatArray, count: int, sign: float) -> tuple[int, ...]:
     """The best settings by mean score, those that failed anywhere left out.
 
     Args:

@@ -19,10 +19,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
-from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere, Image
+from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters

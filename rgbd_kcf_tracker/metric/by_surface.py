@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.crowd import MISSES, SMALL, Account, absent
@@ -45,8 +46,6 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target: from

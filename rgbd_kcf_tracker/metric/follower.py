@@ -9,8 +9,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look
@@ -38,8 +38,6 @@ from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
-
-FloatArray = npt.NDArray[np.float64]
 
 LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
 """Metres, and shares of its width, by which the middle of a box found by look is off the target's:

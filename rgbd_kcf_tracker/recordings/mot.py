@@ -23,13 +23,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFile
 from rgbd_kcf_tracker.recordings.textfiles import read_lines
 from rgbd_kcf_tracker.track import Track
 
-Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
 REGION_ID = -1
@@ -60,10 +60,10 @@ class Sightings:
 
     frames: Integers
     ids: Integers
-    boxes: Array
-    scores: Array
-    shares: Array
-    positions: Array
+    boxes: FloatArray
+    scores: FloatArray
+    shares: FloatArray
+    positions: FloatArray
 
     @classmethod
     def of(
@@ -81,7 +81,7 @@ class Sightings:
         who = np.asarray(ids, np.int64).reshape(count)
         order = np.lexsort((who, number))
 
-        def column(values: npt.ArrayLike | None, width: int, default: float) -> Array:
+        def column(values: npt.ArrayLike | None, width: int, default: float) -> FloatArray:
             shape = (count, width) if width else (count,)
             if values is None:
                 return np.full(shape, default)

@@ -10,14 +10,12 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.overlay import id_color
 from rgbd_kcf_tracker.recordings.track_messages import MARKER_LIFETIME_NS, TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
-
-FloatArray = npt.NDArray[np.float64]
 
 ELLIPSOID = math.sqrt(7.815)
 """Standard deviations of the ellipsoid that holds 95 % (chi-square of three dimensions)."""

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.camera_info import model_of
@@ -30,8 +30,6 @@ from rgbd_kcf_tracker.recordings.messages import (
 from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 from rgbd_kcf_tracker.track import Track
-
-FloatArray = npt.NDArray[np.float64]
 
 MARKER_LIFETIME_NS = 500_000_000
 """After which a viewer takes away what nobody renews."""

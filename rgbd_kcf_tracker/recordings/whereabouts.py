@@ -11,13 +11,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.track import Track, TrackState
-
-FloatArray = npt.NDArray[np.float64]
 
 WALKING = 0.3
 """Metres per second from which a target's velocity says where it faces; one that stands sways."""

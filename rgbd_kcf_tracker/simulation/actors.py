@@ -11,17 +11,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from rgbd_kcf_tracker.simulation import materials, textures
 from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.people import Person
 from rgbd_kcf_tracker.simulation.room import Face, draw_face
-from rgbd_kcf_tracker.simulation.solids import Atlas, Layer, SolidList, Solids, render
+from rgbd_kcf_tracker.simulation.solids import Atlas, Layer, SolidList, Solids, Vector, render
 from rgbd_kcf_tracker.simulation.walking import Visit
 from rgbd_kcf_tracker.simulation.world import Viewpoint
 
-Vector = npt.NDArray[np.float64]
 Window = tuple[int, int, int, int]
 _DOWN = np.array([0.0, 1.0, 0.0])
 

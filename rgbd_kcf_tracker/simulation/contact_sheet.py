@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 
-Image = npt.NDArray[np.uint8]
 VISIBLE: tuple[int, int, int] = (60, 230, 60)
 BODY: tuple[int, int, int] = (255, 200, 60)
 OTHERS: tuple[int, int, int] = (80, 80, 240)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rgbd_kcf_tracker.simulation.floorplan import Point
-from rgbd_kcf_tracker.simulation.motion import Vector
+from rgbd_kcf_tracker.simulation.solids import Vector
 
 _STEP = 0.02  # seconds
 

@@ -15,11 +15,10 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from rgbd_kcf_tracker.simulation.people import Stance
+from rgbd_kcf_tracker.simulation.solids import Vector
 
-Vector = npt.NDArray[np.float64]
 Keys = Sequence[tuple[float, float]]
 _STEP = 0.01  # seconds between tabulated states
 

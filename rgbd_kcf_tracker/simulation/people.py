@@ -13,9 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.simulation.solids import Atlas, SolidList, Solids
+from rgbd_kcf_tracker.simulation.solids import Atlas, SolidList, Solids, Vector
 from rgbd_kcf_tracker.simulation.wardrobe import (
     EXTRA,
     FOREARM,
@@ -30,8 +29,6 @@ from rgbd_kcf_tracker.simulation.wardrobe import (
     THIGH,
     Wardrobe,
 )
-
-Vector = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,8 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.simulation import materials, textures
-from rgbd_kcf_tracker.simulation.solids import NEAR, Atlas, SolidList, Solids
+from rgbd_kcf_tracker.simulation.solids import NEAR, Atlas, SolidList, Solids, Vector
 from rgbd_kcf_tracker.simulation.textures import Texture
-
-Vector = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,9 +10,10 @@ import math
 import numpy as np
 
 from rgbd_kcf_tracker.simulation.actors import FacesActor, PersonActor, animal, ball, mug
-from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, Motion, Vector, hand_waves
+from rgbd_kcf_tracker.simulation.motion import CameraMotion, Keys, Motion, hand_waves
 from rgbd_kcf_tracker.simulation.room import table
 from rgbd_kcf_tracker.simulation.scenarios_basic import stroll
+from rgbd_kcf_tracker.simulation.solids import Vector
 from rgbd_kcf_tracker.simulation.stage import Point, Stage, route, scenario
 from rgbd_kcf_tracker.simulation.world import Actor, World
 

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.simulation.solids import Floats
 
-Floats = npt.NDArray[np.float32]
 DEPTH_FOCAL = 365.0
 BASELINE = 0.052
 HALF_ANGLE = np.radians(35.3)

@@ -15,7 +15,8 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
 from rgbd_kcf_tracker.simulation.sensor import Sensor
-from rgbd_kcf_tracker.simulation.world import Vector, World
+from rgbd_kcf_tracker.simulation.solids import Vector
+from rgbd_kcf_tracker.simulation.world import World
 
 EPOCH_NS = 1_700_000_000_000_000_000
 _MOMENT = 0.01

@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.simulation.motion import CameraMotion
 from rgbd_kcf_tracker.simulation.room import Room
 from rgbd_kcf_tracker.simulation.sensor import SensorOptions
-from rgbd_kcf_tracker.simulation.solids import Layer, Lighting
+from rgbd_kcf_tracker.simulation.solids import Layer, Lighting, Vector
 
-Vector = npt.NDArray[np.float64]
 Gain = tuple[float, float, float]
 
 

@@ -8,18 +8,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.geometry import Box
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
-Boxes = Sequence[Box | None] | Array
+Boxes = Sequence[Box | None] | FloatArray
 """One box per frame: a sequence with None, or an ``(N, 4)`` array with NaN, where there is none."""
 
 
-def as_array(boxes: Boxes) -> Array:
+def as_array(boxes: Boxes) -> FloatArray:
     """Boxes as ``(N, 4)`` float64 ``x, y, width, height`` in pixels, NaN where there is none.
 
     A row that is not finite, or whose width or height is not positive, counts as no box.
@@ -47,35 +45,35 @@ def present(boxes: Boxes) -> Mask:
     return there
 
 
-def iou(predicted: Boxes, truth: Boxes) -> Array:
+def iou(predicted: Boxes, truth: Boxes) -> FloatArray:
     """``(N,)`` intersection over union, 0 to 1, NaN where either box is missing (thesis 3.3.3)."""
     a, b = _pair(predicted, truth)
     far = np.minimum(a[:, :2] + a[:, 2:], b[:, :2] + b[:, 2:])
     near = np.maximum(a[:, :2], b[:, :2])
     common = np.prod(np.maximum(far - near, 0.0), axis=1)
     union = np.prod(a[:, 2:], axis=1) + np.prod(b[:, 2:], axis=1) - common
-    ratio: Array = common / union
+    ratio: FloatArray = common / union
     return ratio
 
 
-def center_offset(predicted: Boxes, truth: Boxes) -> Array:
+def center_offset(predicted: Boxes, truth: Boxes) -> FloatArray:
     """``(N, 2)`` centre of the prediction minus centre of the truth, x and y in pixels.
 
     NaN where either box is missing (thesis 3.3.2).
     """
     a, b = _pair(predicted, truth)
-    offset: Array = (a[:, :2] + a[:, 2:] / 2) - (b[:, :2] + b[:, 2:] / 2)
+    offset: FloatArray = (a[:, :2] + a[:, 2:] / 2) - (b[:, :2] + b[:, 2:] / 2)
     return offset
 
 
-def center_error(predicted: Boxes, truth: Boxes) -> Array:
+def center_error(predicted: Boxes, truth: Boxes) -> FloatArray:
     """``(N,)`` distance of the centres in pixels, NaN where a box is missing (thesis 3.3.1)."""
     offset = center_offset(predicted, truth)
-    error: Array = np.hypot(offset[:, 0], offset[:, 1])
+    error: FloatArray = np.hypot(offset[:, 0], offset[:, 1])
     return error
 
 
-def _pair(predicted: Boxes, truth: Boxes) -> tuple[Array, Array]:
+def _pair(predicted: Boxes, truth: Boxes) -> tuple[FloatArray, FloatArray]:
     a, b = as_array(predicted), as_array(truth)
     if len(a) != len(b):
         raise DatasetError(

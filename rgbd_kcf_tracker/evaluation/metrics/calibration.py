@@ -15,14 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 
 BINS = 10
 
 SURE = 0.9
 """From this score on a tracker says that it is sure."""
 
-LIMITS: Array = np.linspace(0.0, 1.0, 101)
+LIMITS: FloatArray = np.linspace(0.0, 1.0, 101)
 """Scores from which on the share of good boxes is drawn."""
 
 
@@ -38,13 +38,13 @@ class Honesty:
         sure_share: the share of them that is good, NaN without any.
     """
 
-    limits: Array
-    shares: Array
+    limits: FloatArray
+    shares: FloatArray
     sure: int
     sure_share: float
 
 
-def honesty(scores: Array, good: Mask, limits: Array = LIMITS) -> Honesty:
+def honesty(scores: FloatArray, good: Mask, limits: FloatArray = LIMITS) -> Honesty:
     """Of the boxes of each score and above, the share that is good.
 
     Args:
@@ -57,7 +57,7 @@ def honesty(scores: Array, good: Mask, limits: Array = LIMITS) -> Honesty:
     s, g = scores[known][order], good[known][order].astype(np.float64)
     below = np.concatenate(([0.0], np.cumsum(g)))
 
-    def share(at: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    def share(at: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
         first = np.searchsorted(s, at, side='left')
         count = len(s) - first
         values = (below[-1] - below[first]) / np.maximum(count, 1)
@@ -80,16 +80,16 @@ class Reliability:
         brier: mean squared distance of score and outcome (1 right, 0 wrong); NaN without boxes.
     """
 
-    edges: Array
+    edges: FloatArray
     counts: npt.NDArray[np.int64]
-    mean_score: Array
-    hit_rate: Array
+    mean_score: FloatArray
+    hit_rate: FloatArray
     expected_error: float
     brier: float
 
 
 def reliability(
-    scores: Array, hits: Mask, bins: int = BINS, weights: Array | None = None
+    scores: FloatArray, hits: Mask, bins: int = BINS, weights: FloatArray | None = None
 ) -> Reliability:
     """Reliability of the boxes' scores.
 

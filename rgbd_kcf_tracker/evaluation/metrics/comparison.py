@@ -9,15 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import (
-    Array,
-    Boxes,
-    Mask,
-    as_array,
-    center_offset,
-    iou,
-    present,
-)
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Boxes, as_array, center_offset, iou, present
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,18 +27,18 @@ class Comparison:
 
     said: Mask
     there: Mask
-    overlap: Array
-    offset: Array
-    score: Array
+    overlap: FloatArray
+    offset: FloatArray
+    score: FloatArray
 
     @property
-    def error(self) -> Array:
+    def error(self) -> FloatArray:
         """``(N,)`` centre error in pixels, NaN where either box is missing."""
-        distance: Array = np.hypot(self.offset[:, 0], self.offset[:, 1])
+        distance: FloatArray = np.hypot(self.offset[:, 0], self.offset[:, 1])
         return distance
 
     @property
-    def ratio(self) -> Array:
+    def ratio(self) -> FloatArray:
         """``(N,)`` Princeton's r_i: IoU where both boxes exist, 1 for neither, -1 for one alone."""
         ratio = np.where(self.said == self.there, self.overlap, -1.0)
         ratio[~self.said & ~self.there] = 1.0
@@ -59,7 +52,7 @@ def compare(
     predicted: Boxes,
     truth: Boxes,
     body: Boxes | None = None,
-    scores: Array | None = None,
+    scores: FloatArray | None = None,
     skip: int = 1,
 ) -> Comparison:
     """Hold a run against its ground truth.

@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Boxes, Mask, iou, present
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Boxes, iou, present
 
 HIT_IOU = 0.5
 """Overlap from which a box counts as correct (Everingham et al., PASCAL VOC, 2010)."""
@@ -60,7 +61,9 @@ def count(predicted: Boxes, truth: Boxes, hit_iou: float = HIT_IOU) -> Counts:
     return count_overlaps(iou(predicted, truth), present(predicted), present(truth), hit_iou)
 
 
-def count_overlaps(overlaps: Array, said: Mask, there: Mask, hit_iou: float = HIT_IOU) -> Counts:
+def count_overlaps(
+    overlaps: FloatArray, said: Mask, there: Mask, hit_iou: float = HIT_IOU
+) -> Counts:
     """Counts of one sequence from ``(N,)`` IoU, where a box was given, where the target shows."""
     hit = said & there & (np.nan_to_num(overlaps, nan=-1.0) >= hit_iou)
     return Counts(

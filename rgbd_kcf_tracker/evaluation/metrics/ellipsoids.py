@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.track import Track
 
 LIMIT = 7.814728
@@ -94,7 +94,7 @@ def coverage(places: Sequence[Place]) -> Coverage:
 def _distance(told: Triple, true: Triple, covariance: Sequence[float]) -> tuple[float, float]:
     """Squared Mahalanobis distance and length of an error; infinite for no covariance."""
     error = np.subtract(told, true)
-    spread: Array = np.array(covariance, np.float64).reshape(3, 3)
+    spread: FloatArray = np.array(covariance, np.float64).reshape(3, 3)
     length = float(np.linalg.norm(error))
     try:
         root = np.linalg.cholesky(spread)

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU
 from rgbd_kcf_tracker.evaluation.metrics.presence import (
     HIT_SHARE,
@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.recordings.mot import REGION_ID, Sightings
 
 Integers = npt.NDArray[np.int64]
 
-ALPHAS: Array = np.arange(1, 20) / 20
+ALPHAS: FloatArray = np.arange(1, 20) / 20
 """Overlaps over which HOTA is averaged: 0.05, 0.10, ..., 0.95 (Luiten et al. 2021)."""
 
 REGION_SHARE = 0.5
@@ -86,7 +86,7 @@ class Everyone:
     boxes: float
 
 
-def score(truth: Sightings, tracks: Sightings, bodies: Array | None = None) -> Everyone:
+def score(truth: Sightings, tracks: Sightings, bodies: FloatArray | None = None) -> Everyone:
     """All measures of one recording.
 
     Rows of the ground truth with a score of 0 are neither hit nor miss: as in the MOT Challenge,
@@ -140,11 +140,11 @@ def mean(scores: Iterable[Everyone]) -> Everyone:
         return Everyone(*[float(v) for v in np.nanmean(rows, axis=0)])
 
 
-def overlaps(a: Array, b: Array) -> Array:
+def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:
     """``(N, M)`` IoU of ``(N, 4)`` and ``(M, 4)`` boxes."""
     common = _common(a, b)
     union = np.prod(a[:, 2:], axis=1)[:, None] + np.prod(b[:, 2:], axis=1)[None] - common
-    result: Array = common / union
+    result: FloatArray = common / union
     return result
 
 
@@ -155,7 +155,7 @@ class _Moment:
     frame: int
     truth: Integers
     tracks: Integers
-    iou: Array
+    iou: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,14 +170,14 @@ class _Clear:
 class _Agreement:
     """IoU of rows of the truth with rows of the tracks."""
 
-    def __init__(self, truth: Sightings, tracks: Sightings, bodies: Array | None) -> None:
+    def __init__(self, truth: Sightings, tracks: Sightings, bodies: FloatArray | None) -> None:
         self.truth, self.tracks, self._bodies = truth, tracks, bodies
 
-    def __call__(self, people: Integers, boxes: Integers) -> Array:
+    def __call__(self, people: Integers, boxes: Integers) -> FloatArray:
         iou = overlaps(self.truth.boxes[people], self.tracks.boxes[boxes])
         if self._bodies is None:
             return iou
-        whole: Array = np.fmax(iou, overlaps(self._bodies[people], self.tracks.boxes[boxes]))
+        whole: FloatArray = np.fmax(iou, overlaps(self._bodies[people], self.tracks.boxes[boxes]))
         return whole
 
 
@@ -320,7 +320,7 @@ def _numbers(side: Sightings, moments: list[_Moment], name: str) -> tuple[Intege
 
 def _walk(
     moments: list[_Moment], people: Integers, boxes: Integers
-) -> Iterable[tuple[int, Integers, Integers, Array]]:
+) -> Iterable[tuple[int, Integers, Integers, FloatArray]]:
     """Frame, numbers of the people and of the ids in it, and their IoU."""
     i = j = 0
     for moment in moments:
@@ -337,14 +337,14 @@ def _by_frame(truth: Sightings, tracks: Sightings) -> Iterable[tuple[int, Intege
         yield int(frame), own, theirs
 
 
-def _assign(value: Array) -> tuple[Integers, Integers]:
+def _assign(value: FloatArray) -> tuple[Integers, Integers]:
     """The one-to-one pairs with the greatest sum; pairs without value are none."""
     rows, columns = linear_sum_assignment(-value)
     some = value[rows, columns] > 0
     return rows[some], columns[some]
 
 
-def _in_region(regions: Array, boxes: Array) -> Mask:
+def _in_region(regions: FloatArray, boxes: FloatArray) -> Mask:
     """``(M,)`` boxes that lie in a region by :data:`REGION_SHARE` or more."""
     inside = _common(regions, boxes) / np.prod(boxes[:, 2:], axis=1)[None]
     result: Mask = (inside >= REGION_SHARE).any(axis=0)
@@ -357,11 +357,11 @@ def _in(count: int, chosen: Integers) -> Mask:
     return mask
 
 
-def _common(a: Array, b: Array) -> Array:
+def _common(a: FloatArray, b: FloatArray) -> FloatArray:
     """``(N, M)`` area that two boxes share."""
     near = np.maximum(a[:, None, :2], b[None, :, :2])
     far = np.minimum(a[:, None, :2] + a[:, None, 2:], b[None, :, :2] + b[None, :, 2:])
-    area: Array = np.prod(np.maximum(far - near, 0.0), axis=2)
+    area: FloatArray = np.prod(np.maximum(far - near, 0.0), axis=2)
     return area
 
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Boxes, iou, present
+from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Boxes, iou, present
 
 RESOLUTION = 100
 """Number of thresholds at most, the two infinite ones included."""
@@ -31,8 +32,8 @@ class ScoredSequence:
         visible: number of frames in which the target shows.
     """
 
-    overlaps: Array
-    scores: Array
+    overlaps: FloatArray
+    scores: FloatArray
     visible: int
 
 
@@ -40,15 +41,15 @@ class ScoredSequence:
 class LongTerm:
     """Precision and recall over thresholds, and the best F-score with its precision and recall."""
 
-    thresholds: Array
-    precisions: Array
-    recalls: Array
+    thresholds: FloatArray
+    precisions: FloatArray
+    recalls: FloatArray
     precision: float
     recall: float
     f_score: float
 
 
-def scored(predicted: Boxes, scores: Array, truth: Boxes) -> ScoredSequence:
+def scored(predicted: Boxes, scores: FloatArray, truth: Boxes) -> ScoredSequence:
     """A sequence's overlaps and scores.
 
     Args:
@@ -63,7 +64,7 @@ def scored(predicted: Boxes, scores: Array, truth: Boxes) -> ScoredSequence:
     )
 
 
-def score_thresholds(scores: Array, resolution: int = RESOLUTION) -> Array:
+def score_thresholds(scores: FloatArray, resolution: int = RESOLUTION) -> FloatArray:
     """Infinity, then the scores or their quantiles downwards, then minus infinity.
 
     Args:
@@ -77,11 +78,13 @@ def score_thresholds(scores: Array, resolution: int = RESOLUTION) -> Array:
     if len(ordered) > resolution - 2:
         chosen = np.linspace(0, len(ordered) - 1, resolution - 2).round().astype(np.int64)
         ordered = ordered[chosen]
-    thresholds: Array = np.concatenate(([np.inf], ordered, [-np.inf]))
+    thresholds: FloatArray = np.concatenate(([np.inf], ordered, [-np.inf]))
     return thresholds
 
 
-def precision_recall(sequence: ScoredSequence, thresholds: Array) -> tuple[Array, Array]:
+def precision_recall(
+    sequence: ScoredSequence, thresholds: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Precision and recall of one sequence at each threshold.
 
     Precision is the mean overlap of the boxes whose score is at least the threshold (1 without
@@ -98,8 +101,8 @@ def precision_recall(sequence: ScoredSequence, thresholds: Array) -> tuple[Array
     kept = sequence.scores[:, None] >= thresholds[None, :]  # NaN is never kept
     boxes = kept.sum(axis=0)
     overlap = (sequence.overlaps[:, None] * kept).sum(axis=0)
-    precisions: Array = np.where(boxes > 0, overlap / np.maximum(boxes, 1), 1.0)
-    recalls: Array = overlap / max(sequence.visible, 1)
+    precisions: FloatArray = np.where(boxes > 0, overlap / np.maximum(boxes, 1), 1.0)
+    recalls: FloatArray = overlap / max(sequence.visible, 1)
     return precisions, recalls
 
 
@@ -110,8 +113,8 @@ def evaluate(sequences: Sequence[ScoredSequence], resolution: int = RESOLUTION) 
         return LongTerm(empty, empty, empty, math.nan, math.nan, math.nan)
     thresholds = score_thresholds(np.concatenate([s.scores for s in sequences]), resolution)
     curves = [precision_recall(s, thresholds) for s in sequences]
-    precisions: Array = np.mean([c[0] for c in curves], axis=0)
-    recalls: Array = np.mean([c[1] for c in curves], axis=0)
+    precisions: FloatArray = np.mean([c[0] for c in curves], axis=0)
+    recalls: FloatArray = np.mean([c[1] for c in curves], axis=0)
     sums = precisions + recalls
     f = np.where(sums > 0, 2 * precisions * recalls / np.where(sums > 0, sums, 1.0), 0.0)
     best = int(np.argmax(f))

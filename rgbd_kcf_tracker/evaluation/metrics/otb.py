@@ -11,19 +11,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 
-OVERLAP_THRESHOLDS: Array = np.arange(21) / 20.0
+OVERLAP_THRESHOLDS: FloatArray = np.arange(21) / 20.0
 """0, 0.05, ..., 1."""
 
-PIXEL_THRESHOLDS: Array = np.arange(51, dtype=np.float64)
+PIXEL_THRESHOLDS: FloatArray = np.arange(51, dtype=np.float64)
 """0, 1, ..., 50 pixels."""
 
 PRECISION_BIN = 20
 """The bin whose value stands for the whole precision curve: 20 pixels."""
 
 
-def success_curve(overlaps: Array) -> Array:
+def success_curve(overlaps: FloatArray) -> FloatArray:
     """``(21,)`` share of frames whose IoU is above each threshold.
 
     Args:
@@ -32,7 +32,7 @@ def success_curve(overlaps: Array) -> Array:
     return _shares(np.nan_to_num(overlaps, nan=-1.0)[:, None] > OVERLAP_THRESHOLDS, 21)
 
 
-def precision_curve(errors: Array) -> Array:
+def precision_curve(errors: FloatArray) -> FloatArray:
     """``(51,)`` share of frames whose centre error is at most each threshold.
 
     Args:
@@ -41,7 +41,7 @@ def precision_curve(errors: Array) -> Array:
     return _shares(np.nan_to_num(errors, nan=np.inf)[:, None] <= PIXEL_THRESHOLDS, 51)
 
 
-def area_under_curve(curve: Array) -> float:
+def area_under_curve(curve: FloatArray) -> float:
     """AUC as the benchmark takes it: the mean of the curve's values.
 
     Args:
@@ -53,13 +53,13 @@ def area_under_curve(curve: Array) -> float:
     return float(np.mean(curve))
 
 
-def precision_at_20(curve: Array) -> float:
+def precision_at_20(curve: FloatArray) -> float:
     """The precision curve's value at 20 pixels."""
     return float(curve[PRECISION_BIN])
 
 
-def _shares(passed: Mask, size: int) -> Array:
+def _shares(passed: Mask, size: int) -> FloatArray:
     if not len(passed):
         return np.full(size, np.nan)
-    shares: Array = np.mean(passed, axis=0)
+    shares: FloatArray = np.mean(passed, axis=0)
     return shares

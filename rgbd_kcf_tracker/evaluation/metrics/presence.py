@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU
 
 STRANGER_IOU = 0.1
@@ -29,7 +29,7 @@ HIT_SHARE = 0.5
 """Of the judged frames, at least this share must be hit."""
 
 
-def strangers(overlap: Array, said: Mask, there: Mask) -> float:
+def strangers(overlap: FloatArray, said: Mask, there: Mask) -> float:
     """Of all frames, the share with a box on something else; NaN without frames.
 
     Args:
@@ -43,7 +43,7 @@ def strangers(overlap: Array, said: Mask, there: Mask) -> float:
     return float(np.mean(said & ~near))
 
 
-def returns(overlap: Array, said: Mask, there: Mask) -> float:
+def returns(overlap: FloatArray, said: Mask, there: Mask) -> float:
     """Of the times the target came back for five frames or more, the share that was found.
 
     It is found if at least half of the frames from the third on are hit (IoU >= 0.5). NaN where the

@@ -13,10 +13,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
 
-THRESHOLDS: Array = np.linspace(0.0, 1.0, 21)
+THRESHOLDS: FloatArray = np.linspace(0.0, 1.0, 21)
 """Overlaps at which the success rate is drawn: 0, 0.05, ..., 1."""
 
 CATEGORIES: dict[str, tuple[str, ...]] = {
@@ -29,16 +29,16 @@ CATEGORIES: dict[str, tuple[str, ...]] = {
 """The benchmark's five splits of its sequences: eleven categories, as in thesis Table 4.1."""
 
 
-def success_rate(ratios: Array, threshold: float = 0.5) -> float:
+def success_rate(ratios: FloatArray, threshold: float = 0.5) -> float:
     """R: share of frames with ``r_i > threshold``; NaN without frames."""
     return float(np.mean(ratios > threshold)) if len(ratios) else float('nan')
 
 
-def success_curve(ratios: Array, thresholds: Array = THRESHOLDS) -> Array:
+def success_curve(ratios: FloatArray, thresholds: FloatArray = THRESHOLDS) -> FloatArray:
     """R at each threshold; NaN without frames."""
     if not len(ratios):
         return np.full(len(thresholds), np.nan)
-    rates: Array = np.mean(ratios[:, None] > thresholds[None, :], axis=0)
+    rates: FloatArray = np.mean(ratios[:, None] > thresholds[None, :], axis=0)
     return rates
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.arrays import FloatArray
 
 Labels = npt.NDArray[np.int64]
 
@@ -39,9 +39,9 @@ class Effect:
         p: of a share as large by chance.
     """
 
-    means: Array
-    low: Array
-    high: Array
+    means: FloatArray
+    low: FloatArray
+    high: FloatArray
     share: float
     p: float
 
@@ -51,7 +51,7 @@ class Effect:
         return float(np.ptp(self.means))
 
 
-def effect(scores: Array, labels: Labels, balanced: bool) -> Effect:
+def effect(scores: FloatArray, labels: Labels, balanced: bool) -> Effect:
     """What the values of one parameter do.
 
     Args:
@@ -87,7 +87,7 @@ def effect(scores: Array, labels: Labels, balanced: bool) -> Effect:
     )
 
 
-def gain(differences: Array) -> tuple[float, float, float, float]:
+def gain(differences: FloatArray) -> tuple[float, float, float, float]:
     """Whether a setting is better than another on independent sequences.
 
     Args:
@@ -104,7 +104,7 @@ def gain(differences: Array) -> tuple[float, float, float, float]:
     return mean, float(low[0]), float(high[0]), p
 
 
-def bootstrap(rows: Array) -> tuple[Array, Array]:
+def bootstrap(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """95 % interval of each row's mean, its ``Q`` columns drawn anew."""
     rng = np.random.default_rng(SEED)
     columns = rows.shape[1]
@@ -125,7 +125,7 @@ def holm(ps: list[float]) -> list[float]:
     return [float(p) for p in adjusted]
 
 
-def binned(values: Array, bins: int) -> Labels:
+def binned(values: FloatArray, bins: int) -> Labels:
     """Which of up to ``bins`` equally full bins each value is in, none of them empty."""
     distinct = np.unique(values)
     if len(distinct) <= bins:
@@ -135,13 +135,13 @@ def binned(values: Array, bins: int) -> Labels:
     return labels.astype(np.int64)
 
 
-def _between(means: Array, counts: Array) -> float:
+def _between(means: FloatArray, counts: FloatArray) -> float:
     """Variance between values, each counting as often as there are settings with it."""
     middle = np.average(means, weights=counts)
     return float(np.average((means - middle) ** 2, weights=counts))
 
 
-def _p(found: float, chance: Array) -> float:
+def _p(found: float, chance: FloatArray) -> float:
     """Share of chances that are as large, the one found among them."""
     # Sums in another order differ in their last digits.
     return float((1 + np.sum(chance >= found * (1 - 1e-9))) / (1 + len(chance)))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics.calibration import Reliability, reliability
 
 HALF = 0.5
@@ -42,7 +42,7 @@ class Separation:
     taken: float
 
 
-def separation(probabilities: Array, same: Mask) -> Separation:
+def separation(probabilities: FloatArray, same: Mask) -> Separation:
     """How well probabilities part pairs of one person from pairs of two.
 
     Args:
@@ -56,7 +56,7 @@ def separation(probabilities: Array, same: Mask) -> Separation:
     return Separation(len(one), len(two), area, _above(one), _above(two))
 
 
-def balanced_reliability(probabilities: Array, same: Mask) -> Reliability:
+def balanced_reliability(probabilities: FloatArray, same: Mask) -> Reliability:
     """Whether the probabilities mean what they say, were every second pair of one person.
 
     How many pairs of two there are depends on how many people a recording has, which says nothing
@@ -66,5 +66,5 @@ def balanced_reliability(probabilities: Array, same: Mask) -> Reliability:
     return reliability(probabilities, same, weights=weights)
 
 
-def _above(values: Array) -> float:
+def _above(values: FloatArray) -> float:
     return float(np.mean(values >= HALF)) if len(values) else math.nan

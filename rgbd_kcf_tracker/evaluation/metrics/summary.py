@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics import confusion, otb, presence, princeton
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array, Boxes, Mask
+from rgbd_kcf_tracker.evaluation.metrics.boxes import Boxes
 from rgbd_kcf_tracker.evaluation.metrics.comparison import Comparison, compare
 
 PRECISION_PX = 20.0
@@ -115,12 +116,12 @@ def pooled_counts(comparisons: Sequence[Comparison]) -> confusion.Counts:
     return total
 
 
-def _mean(values: Array | Mask) -> float:
+def _mean(values: FloatArray | Mask) -> float:
     return float(np.mean(values)) if len(values) else math.nan
 
 
-def _known(values: Array) -> Array:
-    known: Array = values[~np.isnan(values)]
+def _known(values: FloatArray) -> FloatArray:
+    known: FloatArray = values[~np.isnan(values)]
     return known
 
 

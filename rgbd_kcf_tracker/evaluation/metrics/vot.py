@@ -18,7 +18,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.evaluation.metrics.boxes import Array
+from rgbd_kcf_tracker.arrays import FloatArray
 
 BURN_IN = 10
 """Frames from each start, the start included, that accuracy leaves out."""
@@ -49,14 +49,14 @@ class ShortTermRun:
     """
 
     codes: npt.NDArray[np.int64]
-    overlaps: Array
+    overlaps: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
 class Fragment:
     """Overlaps from a start (left out) up to the failure (left out) or the sequence's end."""
 
-    overlaps: Array
+    overlaps: FloatArray
     failed: bool
 
 
@@ -106,7 +106,7 @@ def fragments(run: ShortTermRun) -> list[Fragment]:
     return result
 
 
-def expected_overlap_curve(runs: Sequence[ShortTermRun], length: int | None = None) -> Array:
+def expected_overlap_curve(runs: Sequence[ShortTermRun], length: int | None = None) -> FloatArray:
     """Expected average overlap of sequences of each length.
 
     A fragment that failed is drawn out with zeros to any length; one that reached the end of its
@@ -133,7 +133,7 @@ def expected_overlap_curve(runs: Sequence[ShortTermRun], length: int | None = No
         total[:reach] += (np.cumsum(padded) / lengths)[:reach]
         count[:reach] += 1
     with np.errstate(invalid='ignore'):
-        curve: Array = total / count
+        curve: FloatArray = total / count
     return curve
 
 

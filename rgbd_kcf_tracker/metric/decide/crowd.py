@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrivals, away
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
@@ -33,8 +34,6 @@ from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 NEW = 0.0
 """Log-odds of being somebody known from which a figure is not somebody new: even ones, as both are

@@ -11,11 +11,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Cue(Protocol):

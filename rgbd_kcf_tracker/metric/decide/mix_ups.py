@@ -18,11 +18,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
-FloatArray = npt.NDArray[np.float64]
 Likeness = npt.NDArray[np.float32]
 
 NEAR = 1.0

@@ -14,15 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
-
-FloatArray = npt.NDArray[np.float64]
 
 LEAST_PIXELS = 12
 """Pixels of the view of a proposed surface, at the least: of fewer, three by four, neither outline

@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
-
-Image = npt.NDArray[np.uint8]
 
 FRAME = 1 / 30
 """Seconds to which the learning rates refer."""

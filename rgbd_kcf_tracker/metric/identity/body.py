@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
     band_histograms,
@@ -20,7 +21,6 @@ from rgbd_kcf_tracker.metric.perceive.colors import CODES, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
-FloatArray = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int32]
 
 GROW_TIME = 0.4

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Mask
+
 Codes = npt.NDArray[np.int32]
-Mask = npt.NDArray[np.bool_]
 
 CODES = 4096
 """Colours that are told apart: 16 levels of each channel, as in the histograms of Lukezic et al.

@@ -9,10 +9,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
-
-Image = npt.NDArray[np.uint8]
 
 MIDDLE = 0.6
 """Share of a box's sides that is looked at: at its rim other things show."""

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.features.optical_flow import Points, followed
 from rgbd_kcf_tracker.features.windows import resampled
 
-Image = npt.NDArray[np.uint8]
 Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
 SIDE, AROUND = 144, 3.0

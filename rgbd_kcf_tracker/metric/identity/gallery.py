@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, Col
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
-FloatArray = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.float32]
 
 SLICES, SLICE = 9, 0.2
 """Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
@@ -79,9 +79,9 @@ class View:
         top: metres above the floor of the head's top, None where it is hidden or no floor known.
     """
 
-    roots: FloatArray
-    area: FloatArray
-    color: FloatArray
+    roots: Floats
+    area: Floats
+    color: Floats
     top: float | None
 
     @classmethod
@@ -139,9 +139,9 @@ class Looks:
         area, color: ``(n, SLICES)``.
     """
 
-    roots: FloatArray
-    area: FloatArray
-    color: FloatArray
+    roots: Floats
+    area: Floats
+    color: Floats
 
     def __len__(self) -> int:
         return len(self.area)
@@ -180,8 +180,8 @@ class Compared:
         alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
     """
 
-    weight: FloatArray
-    alike: FloatArray
+    weight: Floats
+    alike: Floats
 
     @classmethod
     def of(cls, view: View, looks: Looks) -> Compared:
@@ -193,7 +193,7 @@ class Compared:
         cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
         return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2))
 
-    def similarity(self) -> FloatArray:
+    def similarity(self) -> Floats:
         """How alike the view is to each of the others, ``(n,)``, 0 to 1.
 
         The mean over the slices that show in both, at the best of the shifts of lightness; 0 where
@@ -201,7 +201,7 @@ class Compared:
         """
         return _best(self.weight, self.alike)
 
-    def of_each(self, starts: Sequence[int]) -> FloatArray:
+    def of_each(self, starts: Sequence[int]) -> Floats:
         """How alike the view is to each of several people, ``(p,)``, 0 to 1: to his best view.
 
         What one view of somebody does not show is as in whichever other one of his fits best, in
@@ -216,18 +216,18 @@ class Compared:
         whose = np.repeat(np.arange(len(starts)), np.diff([*starts, len(shows)]))
         weight = np.where(shows, self.weight, most[whose])
         alike = np.where(shows[..., None], self.alike, best[whose])
-        found: FloatArray = np.maximum.reduceat(_best(weight, alike), starts)
+        found: Floats = np.maximum.reduceat(_best(weight, alike), starts)
         return found
 
 
-def _best(weight: FloatArray, alike: FloatArray) -> FloatArray:
+def _best(weight: Floats, alike: Floats) -> Floats:
     share = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
     mean = (share[:, None, :] @ alike)[:, 0] - _COST
-    best: FloatArray = np.maximum(mean.max(axis=1), 0)
+    best: Floats = np.maximum(mean.max(axis=1), 0)
     return best
 
 
-def similarity(view: View, looks: Looks) -> FloatArray:
+def similarity(view: View, looks: Looks) -> Floats:
     """How alike a view is to each of several, see :meth:`Compared.similarity`."""
     return Compared.of(view, looks).similarity()
 
@@ -303,7 +303,7 @@ class Gallery:
             alike = float(Compared.of(view, self.looks).of_each([0])[0])
         return self._log_odds(view, alike, len(self.views))
 
-    def log_odds_before(self, time: float, view: View, alike: FloatArray) -> float | None:
+    def log_odds_before(self, time: float, view: View, alike: Floats) -> float | None:
         """The same by what was learned before ``time``, in seconds; None where nothing was.
 
         Args:

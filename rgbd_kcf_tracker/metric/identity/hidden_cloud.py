@@ -16,11 +16,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 TURN_TIME = np.array([1.2, 0.25, 1.2])
 """Seconds in which a hidden target's velocity is forgotten: it may stop or turn; up and down it

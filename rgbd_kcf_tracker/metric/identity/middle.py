@@ -19,8 +19,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.lens import Lens
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
@@ -29,8 +29,6 @@ from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 HALF_CHEST = 0.11
 """Metres from a person's front to the axis: half of a chest, which is 0.2 to 0.25 m deep."""

@@ -6,11 +6,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class MotionFilter:

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
 
-Image = npt.NDArray[np.uint8]
 Features = npt.NDArray[np.float32]
 
 COLOR_WEIGHT = 0.4

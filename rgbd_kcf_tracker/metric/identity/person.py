@@ -6,15 +6,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 PLACE_SIGMA = 0.18
 """Metres by which the middle of a silhouette differs from the person's place: half a chest in

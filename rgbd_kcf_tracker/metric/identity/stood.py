@@ -9,12 +9,10 @@ import math
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.pose import Pose
-
-FloatArray = npt.NDArray[np.float64]
 
 CHOSEN_MOVING = 0.5
 """Probability that a thing moves, before it was seen for a while: it may or may not."""

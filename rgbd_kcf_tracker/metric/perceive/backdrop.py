@@ -19,12 +19,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in, part_of
 from rgbd_kcf_tracker.metric.perceive.ego_motion import changed, corners_between, stands
 
-Image = npt.NDArray[np.uint8]
-Mask = npt.NDArray[np.bool_]
 Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
 DIFFERS = 14

@@ -17,12 +17,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.features.optical_flow import followed
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
 
-FloatArray = npt.NDArray[np.float64]
 GrayImage = npt.NDArray[np.uint8]
 Points = npt.NDArray[np.floating]
 

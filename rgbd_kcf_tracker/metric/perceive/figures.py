@@ -16,13 +16,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, surfaces_in
-
-FloatArray = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 JUMP, JUMP_PER_METRE = 0.06, 0.04
 """Depth step between two figures: limbs stand off the trunk farther than one surface may step."""

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-
-FloatArray = npt.NDArray[np.float64]
 
 MIN_UPRIGHT = 0.75
 """Cosine of the largest tilt between the camera's down axis and the floor's normal."""

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-Image = npt.NDArray[np.uint8]
+from rgbd_kcf_tracker.arrays import Image
 
 DARKEST, BRIGHTEST = 12, 243
 """Values between which a channel is neither noise nor saturated."""

@@ -8,10 +8,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-
-FloatArray = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 BREADTH = 0.4
 """Metres between the heads of two people side by side, at the least."""

@@ -14,12 +14,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
-
-Mask = npt.NDArray[np.bool_]
 
 NOISE = 0.08
 NOISE_PER_SQUARE_METRE = 0.012

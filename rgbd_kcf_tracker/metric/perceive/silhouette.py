@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Mask
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-
-Mask = npt.NDArray[np.bool_]
 
 NEARER = 0.1
 NEARER_PER_METRE = 0.03

@@ -13,13 +13,12 @@ from statistics import median
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
-
-FloatArray = npt.NDArray[np.float64]
 
 HEIGHT = (0.6, 2.1)
 """Metres from the head down to what shows: half of a small person to all of a tall one."""
