@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Frame
+from rgbd_kcf_tracker import Frame, Tracker, create_tracker
 from rgbd_kcf_tracker.bench import things as bench
 from rgbd_kcf_tracker.bench.things_room import furnished
 from rgbd_kcf_tracker.errors import RecordingError
@@ -184,8 +185,17 @@ def folder(room: Moments, tmp_path: Path) -> Path:
 
 
 def test_the_command_counts_the_things_of_a_recording(
-    room: Moments, folder: Path, capsys: pytest.CaptureFixture[str]
+    room: Moments, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ):
+    def frames() -> int:
+        return sum(isinstance(thing, Frame) for thing in gc.get_objects())
+
+    def tracker(variant: str) -> Tracker:
+        most.append(frames())
+        return create_tracker(variant)
+
+    before, most = frames(), list[int]()
+    monkeypatch.setattr(bench, 'create_tracker', tracker)
     k = room[0].intrinsics
     camera = f'{k.fx},{k.fy},{k.cx},{k.cy}'
     line = [str(folder), '--things', str(folder.parent / 'things.csv'), '--fps', '5']
@@ -193,6 +203,7 @@ def test_the_command_counts_the_things_of_a_recording(
     _, head, *rows = capsys.readouterr().out.splitlines()
     assert head.split()[:2] == ['things', 'tracks']
     assert [row.split()[-8] for row in rows] == ['2', '2'], 'tracks: forwards, of two'
+    assert max(most) < before + 4, 'the recording was held in memory'
     assert bench.main([*line, '--strides', '2']) == 2
     assert 'give --intrinsics' in capsys.readouterr().err
 

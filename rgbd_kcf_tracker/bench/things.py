@@ -30,9 +30,10 @@ import csv
 import dataclasses
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,12 +45,12 @@ from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.pose import Pose
-from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
+from rgbd_kcf_tracker.recordings import ReadOptions, Recording, open_recording
 from rgbd_kcf_tracker.recordings.files import read_text
 from rgbd_kcf_tracker.simulation.picture import Truth as SimulatedTruth
 
@@ -168,7 +169,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) -> Tracked:
+def follow(frames: Iterable[Frame], wheres: Sequence[Where | None], box: Box) -> Tracked:
     """Follow what a box shows in the first frame through the others.
 
     Args:
@@ -177,8 +178,9 @@ def follow(frames: Sequence[Frame], wheres: Sequence[Where | None], box: Box) ->
         box: of the thing, pixels.
     """
     tally, tracker = Tracked(tracks=1), create_tracker('metric')
-    tracker.start(frames[0], box)
-    for frame, where in zip(frames[1:], wheres[1:], strict=True):
+    left = iter(frames)
+    tracker.start(next(left), box)
+    for frame, where in zip(left, wheres[1:], strict=True):
         track = tracker.update(frame)
         if where is None:
             continue
@@ -204,9 +206,10 @@ def both_ways(
     for name, order in ends.items():
         if len(order) < LEAST:
             continue
-        shown = [
-            dataclasses.replace(frames[i], stamp_ns=abs(frames[i].stamp_ns - first)) for i in order
-        ]
+        shown = (
+            dataclasses.replace(frame, stamp_ns=abs(frame.stamp_ns - first))
+            for frame in map(frames.__getitem__, order)
+        )
         yield name, follow(shown, [wheres[i] for i in order], thing.box)
 
 
@@ -235,12 +238,13 @@ def stands(frames: Sequence[Frame], step: int) -> list[Stand | None]:
             them at such a step.
     """
     found: list[Stand | None] = []
-    key, at = 0, Stand(0, Pose(np.eye(3), np.zeros(3)))
+    key, before, at = 0, frames[0], Stand(0, Pose(np.eye(3), np.zeros(3)))
     for index, frame in enumerate(frames):
-        motion = _motion(frames[key], frame) if index else Pose(np.eye(3), np.zeros(3))
+        motion = _motion(before, frame) if index else Pose(np.eye(3), np.zeros(3))
         now = None if motion is None else Stand(at.stretch, at.pose.after(motion))
         if index - key == step:
-            key, at = index, now or Stand(at.stretch + 1, Pose(np.eye(3), np.zeros(3)))
+            key, before = index, frame
+            at = now or Stand(at.stretch + 1, Pose(np.eye(3), np.zeros(3)))
             now = at
         found.append(now)
     return found
@@ -346,18 +350,38 @@ def read_things(path: Path) -> list[Thing]:
     return things
 
 
-def recorded(
-    folder: str, things: Sequence[Thing], fps: float, camera: Intrinsics | None
-) -> tuple[list[Frame], list[list[Where | None]]]:
-    """A recording's frames, all in memory, and where each thing is in them.
+class Recorded(Sequence[Frame]):
+    """The frames of a recording, each read when it is asked for: together they may be many GB.
 
     Raises:
-        RgbdKcfError: where it cannot be read, has no depth or camera, or ends before a thing.
+        RgbdKcfError: for one that cannot be read, or has no depth or camera.
     """
-    with open_recording(folder, ReadOptions(fps=fps, intrinsics=camera)) as recording:
-        frames = list(recording.frames())
-    if any(frame.depth is None or frame.intrinsics is None for frame in frames):
-        raise RecordingError(f'{folder}: each image needs depth and a camera: give --intrinsics')
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __getitem__(self, index: Any) -> Any:
+        frame = next(self._recording.frames(index), None)
+        if frame is None:
+            raise IndexError
+        if frame.depth is None or frame.intrinsics is None:
+            raise RecordingError(
+                f'{self._recording.path}: each image needs depth and a camera: give --intrinsics'
+            )
+        return frame
+
+
+def recorded(
+    frames: Sequence[Frame], folder: str, things: Sequence[Thing], fps: float
+) -> list[list[Where | None]]:
+    """Where each thing is in a recording's frames.
+
+    Raises:
+        RgbdKcfError: where they cannot be read, or end before a thing.
+    """
     for thing in things:
         if thing.frame >= len(frames):
             raise RecordingError(
@@ -365,7 +389,7 @@ def recorded(
             )
     step = max(1, round(STEP_S * fps))
     estimates = [stands(frames, step), stands(frames, 2 * step)]
-    return frames, [places(frames, thing, estimates) for thing in things]
+    return [places(frames, thing, estimates) for thing in things]
 
 
 # --- simulated rooms ---------------------------------------------------------------------------
@@ -402,7 +426,7 @@ def measured(args: argparse.Namespace) -> tuple[Tracked, list[tuple[Cell, ...]]]
     camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
     tallies = {stride: Tracked() for stride in args.strides}
 
-    def count(frames: list[Frame], thing: Thing, wheres: list[Where | None], name: str) -> None:
+    def count(frames: Sequence[Frame], thing: Thing, wheres: list[Where | None], name: str) -> None:
         for stride, total in tallies.items():
             for way, tally in both_ways(frames, wheres, thing, stride):
                 total.add(tally)
@@ -414,13 +438,16 @@ def measured(args: argparse.Namespace) -> tuple[Tracked, list[tuple[Cell, ...]]]
                     )
 
     if args.recording:
-        frames, wheres = recorded(args.recording, things, args.fps, camera)
-        for thing, where in zip(things, wheres, strict=True):
-            count(frames, thing, where, args.recording)
+        options = ReadOptions(fps=args.fps, intrinsics=camera)
+        with open_recording(args.recording, options) as recording:
+            frames = Recorded(recording)
+            wheres = recorded(frames, args.recording, things, args.fps)
+            for thing, where in zip(things, wheres, strict=True):
+                count(frames, thing, where, args.recording)
     for seed in parse_seeds(args.seeds) if args.seeds else []:
-        frames, found = simulated(seed)
+        rendered, found = simulated(seed)
         for thing, where in found:
-            count(frames, thing, where, f'room {seed}')
+            count(rendered, thing, where, f'room {seed}')
     all_ = Tracked()
     for tally in tallies.values():
         all_.add(tally)
