@@ -117,3 +117,9 @@ def test_identifiers_and_files_are_there(page: Path) -> None:
         if telling and not re.search(rf'\b{re.escape(last)}\b', source()):
             missing.append(word)
     assert missing == []
+
+
+def test_the_python_interface_is_told_in_full() -> None:
+    page = (ROOT / 'docs' / 'api.md').read_text(encoding='utf-8')
+    told = set(re.findall(rf'^\.\. auto\w+:: {rgbd_kcf_tracker.__name__}\.(\w+)$', page, re.M))
+    assert set(rgbd_kcf_tracker.__all__) - {'RgbdKcfError'} <= told  # with the other errors
