@@ -299,6 +299,17 @@ def test_everyone_gets_an_id_without_being_chosen_and_it_comes_back():
     assert len(targets) == 0, 'nobody was chosen'
 
 
+def test_a_thing_that_is_chosen_twice_in_a_frame_is_one_target():
+    """The second was something else at the same place, which then was not seen again."""
+    box = Box(110, 40, 50, 60)
+    frame = picture([], 0.0, box)
+    targets = TargetSet('metric')
+    first, second = (targets.add(frame, box) for _ in range(2))
+    assert first == second
+    assert len(targets) == 1
+    assert targets.update(picture([], STEP, box))[first].box is not None
+
+
 def test_a_chosen_target_is_not_told_twice():
     targets = TargetSet('metric')
     targets.everyone = True

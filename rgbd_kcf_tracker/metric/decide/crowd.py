@@ -391,6 +391,11 @@ class Crowd:
                 person.chosen = True
                 self._welcome_beside(account, person, beside)
                 return person
+        for person in account.people:
+            last = person.last if person.seen_at == account.time else None
+            if last is not None and last.same(seen):
+                person.chosen = True
+                return person
         person = self.welcome(account.place(seen), account.time, chosen=True)
         account.people.append(person)
         if index >= 0:
