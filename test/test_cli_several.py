@@ -34,6 +34,9 @@ class Fake:
         self.boxes[10 + len(self.boxes)] = box
         return 9 + len(self.boxes)
 
+    def started(self, number: int) -> Track:
+        return Track(self.boxes[number], TrackState.TRACKING, 1.0, 2.0, (0.25, 0.5, 2.0))
+
     def update(self, frame):
         self.updates += 1
         self.boxes = {who: box.moved(1, 0) for who, box in self.boxes.items()}
@@ -71,12 +74,12 @@ def test_several_boxes_are_several_targets(folder: Path, tmp_path: Path, fake, c
     assert main(['track', str(folder), *boxes, *map(str, words)]) == 0
     lines = table.read_text().splitlines()
     assert lines[0] == 'id,frame,stamp_ns,x,y,width,height,state,score,depth_m'
-    assert lines[1].startswith('10,1,33333333,10.0000,20.0000,30.0000,40.0000,tracking,1.0000,')
+    assert lines[1] == '10,1,33333333,10.0000,20.0000,30.0000,40.0000,tracking,1.0000,2.0000'
     assert [line.split(',')[:2] for line in lines[1:]] == [
         ['10', '1'], ['11', '1'], ['10', '2'], ['11', '2'], ['10', '3'], ['11', '3']]  # fmt: skip
     assert text.read_text().splitlines()[:3] == [
-        '2,10,10,20,30,40,1,-1,-1,-1',
-        '2,11,50,60,20,20,1,-1,-1,-1',
+        '2,10,10,20,30,40,1,0.25,0.5,2',
+        '2,11,50,60,20,20,1,0.25,0.5,2',
         '3,10,11,20,30,40,0.5,0.25,0.5,2',
     ]
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FRAME_COUNT) == 3

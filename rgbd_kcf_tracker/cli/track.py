@@ -303,14 +303,12 @@ class _Several:
 
     def follow(self, frame: Frame, boxes: Sequence[Box]) -> Mapping[int, Track]:
         """The tracks in ``frame`` by id; boxes where targets are given."""
-        from rgbd_kcf_tracker.track import Track, TrackState
-
         tracks: dict[int, Track] = {}
         if self._targets.everyone or not boxes:
             tracks.update(self._targets.update(frame))
         for box in boxes:
             who = self._targets.add(frame, box)
-            tracks[who] = Track(box, TrackState.TRACKING, 1.0)
+            tracks[who] = self._targets.started(who)
         return tracks
 
 
