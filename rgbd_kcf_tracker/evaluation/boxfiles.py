@@ -49,7 +49,10 @@ def find_file(pattern: str, sequence: Sequence) -> Path:
     for path in tried:
         if path.is_file():
             return path
-    raise DatasetError(f'no boxes for {sequence.name}: tried {", ".join(map(str, tried))}')
+    raise DatasetError(
+        f'no boxes for {sequence.name}: tried {", ".join(map(str, tried))}; '
+        'name their folder, or a path with {sequence} in it'
+    )
 
 
 def read(path: Path, sequence: Sequence, opened: Opened, frames: int) -> list[Track]:
