@@ -6,10 +6,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from rgbd_kcf_tracker import recordings
+from rgbd_kcf_tracker.bench.demo import SCENARIO, SEED
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.recordings.recording import Closing
+from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.variants import VARIANTS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,3 +55,30 @@ def test_readme_names_every_variant_and_command() -> None:
         assert f'| `{variant}` |' in readme
     for name in main.SUBCOMMANDS:
         assert f'`rgbd-kcf {name}' in readme
+
+
+class Demo(Closing):
+    """The first frames of the demo's recording."""
+
+    def __init__(self, path: str) -> None:
+        assert path == 'demo/recording.mcap'
+
+    def frames(self) -> Iterator[Frame]:
+        scene = simulate(SCENARIO, SEED, duration_s=10.0)
+        return (scene[index].frame for index in range(4))
+
+    def close(self) -> None:
+        pass
+
+
+def test_the_programs_of_the_readme_run_on_the_demo(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(recordings, 'open_recording', Demo)
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    one, several = re.findall(r'^```python\n(.*?)^```', readme, re.M | re.S)
+    for program, targets in ((one, 1), (several, 2)):
+        exec(program, {})
+        said = capsys.readouterr().out.splitlines()
+        assert len(said) == 3 * targets
+        assert all(' tracking Box(' in line for line in said)
