@@ -77,6 +77,24 @@ def test_a_cue_that_cannot_be_made_is_told_in_a_sentence(
         assert words in said
 
 
+@pytest.mark.parametrize(
+    ('option', 'value', 'kind'),
+    [
+        ('--intrinsics', '1,2', 'camera'),
+        ('--intrinsics', '-1,1,1,1', 'camera'),
+        ('--rates', '5,a', 'rates'),
+    ],
+)
+def test_what_is_no_camera_or_rate_is_told_in_a_sentence(
+    option: str, value: str, kind: str,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+):  # fmt: skip
+    monkeypatch.setattr('sys.argv', ['evidence_fit', 'sim:border', f'{option}={value}'])
+    with pytest.raises(SystemExit):
+        main()
+    assert f"argument {option}: invalid {kind} value: '{value}'" in capsys.readouterr().err
+
+
 def test_a_thing_of_wholly_other_look_at_the_targets_place_does_not_pass():
     examples = met()
     more = with_other_looks(examples)

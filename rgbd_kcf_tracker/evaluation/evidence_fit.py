@@ -233,14 +233,30 @@ def _made(name: str) -> Cue:
     return cue
 
 
+def rates(text: str) -> list[float]:
+    """Of the command line; what is none makes ``argparse`` say so by this name."""
+    return [float(rate) for rate in text.split(',')]
+
+
+def camera(text: str) -> Intrinsics:
+    """The same of ``FX,FY,CX,CY``."""
+    return Intrinsics(*map(float, text.split(',')))
+
+
 def main() -> int:
     """Print weights fitted to the data sets of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0] if __doc__ else None)
     parser.add_argument('dataset', nargs='+', help='as for rgbd-kcf evaluate: sim:all, a folder')
     parser.add_argument('--seeds', type=int, nargs='+', default=[1], help='of simulated scenes')
-    parser.add_argument('--rates', default='30,15,10,5', help='frames per second of the scenes')
+    parser.add_argument(
+        '--rates', type=rates, default='30,15,10,5', metavar='HZ,HZ,...',
+        help='frames per second of the scenes',
+    )  # fmt: skip
     parser.add_argument('--fps', type=float, default=5.0, help='of image folders without stamps')
-    parser.add_argument('--intrinsics', help='FX,FY,CX,CY of recordings that do not have them')
+    parser.add_argument(
+        '--intrinsics', type=camera, metavar='FX,FY,CX,CY',
+        help='of recordings that do not have them',
+    )  # fmt: skip
     parser.add_argument(
         '--cue',
         action='append',
@@ -250,8 +266,6 @@ def main() -> int:
     )
     args = parser.parse_args()
     cv2.setNumThreads(1)
-    camera = Intrinsics(*map(float, args.intrinsics.split(','))) if args.intrinsics else None
-    rates = [float(rate) for rate in args.rates.split(',')]
     parts = []
     try:
         options = DatasetOptions(fps=args.fps, seeds=tuple(args.seeds))
@@ -259,9 +273,9 @@ def main() -> int:
             path: str | Path = name if name.startswith('sim:') else Path(name)
             for sequence in open_dataset(str(path), options):
                 simulated = sequence.kind == 'sim'
-                for rate in rates if simulated else [None]:
+                for rate in args.rates if simulated else [None]:
                     cues = tuple(_made(name) for name in args.cue)
-                    parts.append(meet(sequence, rate, None if simulated else camera, cues))
+                    parts.append(meet(sequence, rate, None if simulated else args.intrinsics, cues))
                     print(f'{sequence.name}: {len(parts[-1].labels)} candidates', file=sys.stderr)
         examples = joined(parts)
     except RgbdKcfError as error:
