@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.overlay import draw_box
 from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 
 VISIBLE: tuple[int, int, int] = (60, 230, 60)
@@ -81,7 +82,7 @@ def draw_truth(image: Image, simulated: SimulatedFrame) -> Image:
     others = [(truth.visible, OTHERS) for id_, truth in simulated.truths.items() if id_ != 1]
     for box, color in (*others, (simulated.body, BODY), (simulated.visible, VISIBLE)):
         if box is not None:
-            _draw_box(out, box, scale, color)
+            draw_box(out, box.stretched(scale, scale), color, 1)
     return out
 
 
@@ -118,9 +119,3 @@ def _cell(sequence: SimulatedSequence, tile: int) -> Image:
     text = f'{sequence.scenario}: start, and {at:.1f} s of {length:.1f} s'
     cv2.putText(label, text, (2, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA)
     return np.concatenate([label, np.concatenate(pictures, axis=1)])
-
-
-def _draw_box(image: Image, box: Box, scale: float, color: tuple[int, int, int]) -> None:
-    corner = (round(box.x * scale), round(box.y * scale))
-    opposite = (round(box.right * scale) - 1, round(box.bottom * scale) - 1)
-    cv2.rectangle(image, corner, opposite, color, 1)
