@@ -158,12 +158,13 @@ def test_mistakes_are_explained(
     assert not list(tmp_path.iterdir())
 
 
-def test_contact_sheet(tmp_path: Path) -> None:
+def test_contact_sheet(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     import cv2
 
     path = tmp_path / 'sheet.png'
     scenes = ['--scenario', 'behind_box', '--scenario', 'missing_depth', '--scenario', 'no_depth']
     assert run('--contact-sheet', path, *scenes, *SMALL) == 0
+    assert 'unsupported' not in capfd.readouterr().err, "OpenCV was given a JPEG's quality"
     sheet = cv2.imread(str(path))
     assert sheet is not None
     height, width = sheet.shape[:2]

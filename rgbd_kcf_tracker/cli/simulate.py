@@ -159,7 +159,8 @@ def _draw_sheet(
         simulate(name, seed, args.rate, args.duration, size, args.irregular) for name, seed in jobs
     )
     sheet = contact_sheet(progress(scenes, len(jobs), 'contact sheet'))
-    done, data = cv2.imencode(path.suffix, sheet, [int(cv2.IMWRITE_JPEG_QUALITY), 78])
+    quality = [int(cv2.IMWRITE_JPEG_QUALITY), 78] if path.suffix == '.jpg' else []
+    done, data = cv2.imencode(path.suffix, sheet, quality)
     if not done:
         raise RecordingError(f'{path} cannot be encoded: fewer scenes make a smaller picture')
     write_file(path, data.tobytes(), args.overwrite)
