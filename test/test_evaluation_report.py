@@ -10,6 +10,7 @@ import dataclasses
 import json
 import math
 import re
+import shutil
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
@@ -216,7 +217,7 @@ def test_scores_on_real_and_simulated_data_apart():
         result('metric', 'b2', good, [TRUTH] * 4, 0.3),
     ]
     kinds = {'a': 'sim', 'a2': 'sim', 'b': 'folder', 'b2': 'recording'}
-    infos = {n: Info(n, 's', kind, HIDDEN) for n, kind in kinds.items()}
+    infos = {n: Info(n, 's', kind, HIDDEN, simulated=kind == 'sim') for n, kind in kinds.items()}
     table, found = score_tables.reliability(Measured(runs, infos))
     assert list(found) == [('metric', 'real'), ('metric', 'simulated')]
     real, simulated = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
@@ -328,6 +329,8 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
     good = ''.join(f'{20 + 2 * i},50,30,40\n' for i in range(16))
     (tmp_path / 'walk_1.txt').write_text(good)
     (tmp_path / 'walk_2.txt').write_text(good)
+    truth = scenes / 'walk_2' / 'groundtruth.txt'
+    shutil.copy(truth, truth.with_name('groundtruth_body.txt'))
     code = main([
         'evaluate', str(scenes), '--variants', 'kcf', '--boxes', f'peer={tmp_path}', '--jobs', '1',
         '--short-term', '--eao-lengths', '3-9', '--report', str(report),
@@ -353,6 +356,9 @@ def test_the_command_writes_a_page_that_stands_alone(scenes: Path, tmp_path: Pat
         assert float(rows[row[0]]['success %']) == pytest.approx(value, rel=1e-5)
         assert re.search(rf'<td[^>]*>{value:.1f}</td>', html)
     assert '| kcf |' in (report / 'tables.md').read_text()
+    scored = numbers['tables']['reliability']['rows']
+    apart = [('kcf', 'real'), ('kcf', 'simulated'), ('peer', 'real'), ('peer', 'simulated')]
+    assert [tuple(row[:2]) for row in scored] == apart, 'a simulated scene was taken for a real one'
     assert set(numbers['sequences']) == {'walk_1', 'walk_2'}
     assert numbers['sequences']['walk_1']['scenario'] == 'walk'
     assert (report / 'submission' / 'vot' / 'kcf' / 'baseline' / 'walk_1').is_dir()

@@ -86,6 +86,7 @@ class Info:
         derived: whether the categories are by our criteria.
         image_size: width and height.
         thumbnail_scale: of the pictures kept.
+        simulated: whether whole bodies are known, as they are of simulated scenes alone.
     """
 
     name: str
@@ -95,6 +96,7 @@ class Info:
     derived: bool = True
     image_size: tuple[int, int] = (0, 0)
     thumbnail_scale: float = 1.0
+    simulated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +151,7 @@ def _collect_one(
         not own,
         size,
         float(meta['thumbnail_scale']),
+        truth.body is not None,
     )
     frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
     collected.results.append(

@@ -295,8 +295,8 @@ def reliability(measured: Measured) -> tuple[Table, dict[tuple[str, str], Scored
 
 
 def data_of(measured: Measured, sequence: str) -> str:
-    """Whether a sequence is real or simulated; a scene written as a recording counts as real."""
-    return SIMULATED if measured.infos[sequence].kind == 'sim' else REAL
+    """Whether a sequence is real or simulated."""
+    return SIMULATED if measured.infos[sequence].simulated else REAL
 
 
 def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, float]:
