@@ -53,7 +53,8 @@ which a box counts as right in the benchmarks, too (PASCAL VOC)."""
 PART_IOU, INSIDE = 0.35, 0.9
 """The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
 LEAST_FILL = 0.5
-"""Share of the given box that a surface fills of which the box shows only a part."""
+"""Share of the given box that a surface fills of which the box shows only a part: the greater part
+of it, or the box is about something else."""
 SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
 """Share of the given box that the scattered readings of a target fill, at the least; share of a
 piece that lies in the box from which it is the target's; and metres between the target's readings,
@@ -79,12 +80,14 @@ SLOWING = np.array([1.0, 0.25, 1.0])
 third: it may stop or turn, and up and down nobody goes on for long, as for the particles
 (:data:`~.identity.hidden_cloud.TURN_TIME`)."""
 GROWN, SHRUNK = 0.3, 0.35
-"""Spread of the log size of a body about what is known of it."""
+"""Spread of the log size of a body about what is known of it: arms or a bag make somebody larger by
+a third, a side view or what hides him smaller by as much."""
 PLACED_MIDDLE = 0.4
 """Share of the body's height from its upper end down to where the camera must see past a particle:
 the belly, which is broad and which a table hides less often than legs."""
 LEARN_FRACTION = 0.6
-"""Visible share from which a body of which nothing is cut off is learned from."""
+"""Visible share from which a body of which nothing is cut off is learned from: more than half, as a
+smaller part has not all of its colours."""
 STANDING = 0.5
 """Share of a candidate that is somebody else's, or stood there while the target was elsewhere, from
 which it is not the target: the greater part of it, for everybody touches something or somebody."""
@@ -94,7 +97,8 @@ APART = 0.5
 """Distance between two candidates, in widths of the body, from which they are not parts of one.
 Two who stand side by side are a width apart, and halves of one body half a width."""
 LEAVING = 0.5
-"""Seconds after the last sight in which a target is seen to leave the image."""
+"""Seconds after the last sight in which a target is seen to leave the image: at a walk (1.4 m/s) he
+is out of it then with all of his breadth."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

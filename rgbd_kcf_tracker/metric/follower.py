@@ -43,9 +43,10 @@ LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
 """Metres, and shares of its width, by which the middle of a box found by look is off the target's:
 cells of the filter are a tenth of it, and depth is that of any of its sides."""
 ABOUT = 1.5
-"""Times its size that the surroundings of a box are in which depth is read of what has none."""
+"""Times its size that the surroundings of a box are in which depth is read of what has none: a
+quarter of it on each side, where what holds or carries it shows."""
 EVEN = 0.5
-"""Probability from which a box is shown as the target's alone."""
+"""Probability from which a box is shown as the target's alone: rather his than not."""
 LEARNED = 0.6
 """Score from which a target's look is learned from where it was found: below, it may well be
 somebody else, who would be the target from then on."""

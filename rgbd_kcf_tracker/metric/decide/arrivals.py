@@ -14,7 +14,8 @@ RETURN, GONE = 1.5, 4.0
 known of who comes, and the seconds after which two thirds of that hold: who was missed for a moment
 is not away."""
 KNOWN = 1.0
-"""Returns by which that counts as known from the start."""
+"""Returns by which that counts as known from the start: one, so that what is seen soon outweighs
+it."""
 
 
 def away(gone: float) -> float:

@@ -17,9 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 FADE = 1.0
-"""Seconds after which a hidden target's last place says a third of what it said."""
+"""Seconds after which a hidden target's last place says a third of what it said: within one a
+walker may have gone farther in any direction than a body is broad. :data:`WEIGHTS` are fitted with
+it."""
 AWAY = 0.5
-"""Seconds after which two thirds of what holds for a target that is followed no longer holds."""
+"""Seconds after which two thirds of what holds for a target that is followed no longer holds: some
+frames at 5 Hz, as who was missed in one is mostly still there. Fitted with it likewise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +132,8 @@ people, each right or wrong by the truth; ``evaluation.evidence_fit`` fits them 
 docs/metric.md says on what these were fitted. Hand-set ones were as good, but not calibrated."""
 
 SUREST = 30.0
-"""Log-odds beyond which nothing is surer."""
+"""Log-odds beyond which nothing is surer: ten to the thirteenth to one, about the last that a
+double tells from certainty."""
 
 CUES = (
     ('place', (0, 1, 2)),

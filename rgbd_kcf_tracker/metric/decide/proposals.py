@@ -29,11 +29,14 @@ LEAST_SHARE = 0.06
 """Area of a proposed surface against the target's, at the least: about a head against all of a
 person, which is what shows of somebody behind a cupboard."""
 MOST_SHARE = 3.0
-"""Area of a proposed surface against the target's."""
+"""Area of a proposed surface against the target's, at the most: two who touch are twice as large,
+and a size that is known from one side may be half as large again."""
 TOO_LARGE = 1.7
-"""Area against the target's from which a surface is taken for the target and something else."""
+"""Area against the target's from which a surface is taken for the target and something else: arms
+and a bag add less than half, somebody else beside it as much again."""
 MIXED = 0.2
-"""Share of known pixels from which likewise."""
+"""Share of its pixels that are others' from which likewise: more than lie along an outline, where
+two mix."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,16 @@ from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 FOOT = 0.2
-"""Metres above the floor up to which a body is taken to stand on it."""
+"""Metres above the floor up to which a body is taken to stand on it: feet and ankles lie too near
+to the floor to be told from it."""
 FOOT_SHARE = 0.2
 """The same as a share of what shows: a ball that bounces has no feet."""
 RIM = 2
-"""Columns without a reading from which the depth image is narrower than the colour image."""
+"""Columns without a reading from which the depth image is narrower than the colour image: one or
+two may lack one along any image's edge."""
 SLIMMEST = 0.4
-"""Width of a body against its height, at the least, where it has never been seen whole."""
+"""Width of a body against its height, at the least, where it has never been seen whole: somebody
+whose arms hang down."""
 LIKE = 0.25
 """Share of a column's pixels in the body's colours up to which it is taken to go on."""
 

@@ -20,7 +20,8 @@ from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectru
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 
 FRAME = 1 / 30
-"""Seconds to which the learning rates refer."""
+"""Seconds to which the learning rates refer: a frame of the videos for which they were
+published."""
 MAX_RATE = 0.15
 """Share of a new sample at the most, however long ago the last was: at the default rate from 0.27
 seconds on. One picture, which may show a turned or half hidden target, is not to be most of what is
@@ -28,7 +29,8 @@ known."""
 COLOR_RATE = 2.0
 """How much faster than the filter the colours are learned."""
 MEAN_TIME = 0.7
-"""Seconds over which the mean peak is taken."""
+"""Seconds over which the mean peak is taken: some frames at 5 Hz, so that no single one says what
+is usual."""
 FIRST_PEAK = 0.6
 """What later peaks are of the first, which is that of the very sample just learned."""
 MIN_MASK = 0.2

@@ -28,19 +28,22 @@ SHRINK_TIME = 4.0
 """Seconds in which the size follows what is seen: arms go out fast and a side view does not make a
 body smaller for long."""
 USUAL_TIME = 20.0
-"""Seconds over which the usual area is taken."""
+"""Seconds over which the usual area is taken: longer than two who walk together mostly are one
+figure."""
 MOST_GROWTH = 1.7
 """Area against the usual one from which a body has more likely run together with another."""
 COLOR_TIME = 1.0
-"""Seconds in which the colours follow."""
+"""Seconds in which the colours follow: who turns round takes about as long."""
 ANCHOR = 0.03
 ANCHOR_PER_METRE = 0.01
 """Metres, and metres for each of depth, by which the side of an outline that is not cut off is
 unsure: hair and folds of clothes, and two pixels of the view, each half a centimetre at a metre."""
 FILLED = 0.4
-"""Share of its outline that a body fills; of one that fills less, readings are missing."""
+"""Share of its outline that a body fills, at the least, with arms and legs apart; of one that fills
+less, readings are missing."""
 WOBBLE = 0.06
-"""Metres by which limbs move the outline of a body about its place."""
+"""Metres by which limbs move the outline of a body about its place: half of what an arm that swings
+adds to one side."""
 DEPTH_SIGMA = 0.05
 DEPTH_SIGMA_PER_METRE = 0.02
 """Metres, and metres for each of depth, by which the median depth of a silhouette differs from the

@@ -18,7 +18,9 @@ from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
 BORNE_OUT = 2.0
-"""Log-odds from which what was learned since the return is of the target and stays."""
+"""Log-odds (seven to one) from which what was learned since the return is of the target and stays,
+as much as it takes to say the contrary
+(:data:`~rgbd_kcf_tracker.metric.decide.mix_ups.MIXED_UP`)."""
 AGAIN = 0.15
 """Seconds after which somebody is looked at again: nobody looks otherwise before."""
 

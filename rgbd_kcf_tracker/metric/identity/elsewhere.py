@@ -16,7 +16,8 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 MIDDLE = 0.6
 """Share of a box's sides that is looked at: at its rim other things show."""
 OUTSIDE = 0.5
-"""Share of it that lies beside where the target was, from which it tells anything."""
+"""Share of it that lies beside where the target was, from which it tells anything: the greater part
+of it."""
 UNCHANGED, SAME_COLOR = 0.75, 16
 """Share of these pixels, and levels of their colours, from which a place has not changed: of a
 person's box up to half shows what is behind."""

@@ -27,26 +27,33 @@ Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
 SIDE, AROUND = 144, 3.0
 """Pixels along a side of the window in which the flow is looked for, and its side in units of the
-target's root area."""
+target's root area: with its own size to spare on each side, the target is 48 pixels wide, as many
+as corners of clothes need, and the cost the same at any resolution."""
 LONGEST = 0.6
-"""Share of a long target's longer side that counts as its root area at the least."""
+"""Share of a long target's longer side that counts as its root area at the least: the window is
+then at least 1.8 times as long as it."""
 INNER = 0.9
-"""Share of the target's sides inside which corners are taken."""
+"""Share of the target's sides inside which corners are taken: at its rim other things show."""
 CORNERS, QUALITY, DISTANCE = 60, 0.005, 3
 """Corners at the most, their strength against the strongest one's at the least (Shi and Tomasi,
 CVPR 1994), and pixels between two. Clothes have little texture, so weak ones are taken as well, and
 close together, as a target is some 48 pixels wide here; those that are none are left out by the
 flow back. Sixty make 1770 pairs, which is enough for a median."""
 BACK = 1.0
-"""Pixels between a corner and where the flow forth and back takes it."""
+"""Pixels between a corner and where the flow forth and back takes it: what is farther off was found
+on something else."""
 LEAST_CORNERS, LEAST_SHARE = 8, 0.5
-"""Corners that must agree, and their share of all."""
+"""Corners that must agree, of fewer of which a median may be chance, and their share of all: no
+other motion then has as many."""
 AGREE = 2.0
-"""Pixels from the common motion within which a corner agrees."""
+"""Pixels from the common motion within which a corner agrees: a body bends, and its limbs go their
+own way."""
 LEAST_DISTANCE = 4.0
-"""Pixels between two corners, along an axis, from which their distance tells of growth."""
+"""Pixels between two corners, along an axis, from which their distance tells of growth: nearer, the
+error of a corner is more than anybody grows from frame to frame."""
 LEAST_MASK = 0.2
-"""Share of the box that looks like the target from which other pixels are left out."""
+"""Share of the box that looks like the target from which other pixels are left out, as for the
+filter (:data:`~.appearance.MIN_MASK`)."""
 
 
 @dataclass(frozen=True, slots=True)

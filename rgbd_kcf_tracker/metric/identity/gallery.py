@@ -37,11 +37,14 @@ HEAD_WEIGHT = 0.3
 """Weight of the first slice: hair and skin are much the same on all."""
 DIMMER = (0, 1, -1, 2, -2)
 DIMMER_COST = 0.01
-"""Shifts of lightness, in levels, at which two views are compared, and what each level costs."""
+"""Shifts of lightness, in levels, at which two views are compared, and what each level costs:
+little, so that it only says which of two is more alike that are alike but for their light."""
 LEAST_SLICE = 0.004
-"""Square metres of a slice from which its colours are compared."""
+"""Square metres of a slice from which its colours are compared: a patch of some 6 cm; less is
+mostly rim."""
 LEAST_PIXELS = 30
-"""Pixels left of a silhouette without its rim, where colours are mixed with the background's."""
+"""Pixels left of a silhouette without its rim, where colours are mixed with the background's: of
+fewer the rim is taken, too, as they would hardly fill the colours that are told apart."""
 
 STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.61, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even

@@ -40,7 +40,8 @@ NOISE, NOISE_PER_SQUARE_METRE = 0.0012, 0.0011
 time-of-flight cameras of the Kinect's kind (docs/simulation.md)."""
 PERSON_HEIGHT = 0.9
 SLENDER = 1.3
-"""Metres of height, and times its width, from which a body is taken for a person's."""
+"""Metres of height, and times its width, from which a body is taken for a person's: a child of
+three is as tall, and dogs and chairs are lower or broader."""
 PERSON_MIDDLE, MIDDLE = 0.45, 0.5
 """Share of the height from the top to the middle: a person's centre of mass is at 0.55 of the
 stature, a thing's in the middle."""
@@ -48,11 +49,14 @@ ADULT, ADULT_SIGMA, ADULT_WIDTH = 1.65, 0.2, 0.3
 """Metres of the height of people, its deviation, and the width from which a body whose ends were
 never seen is taken for a person's."""
 THING_SIGMA = 0.25
-"""The deviation of the height of another such body, as a share of what was seen."""
+"""The deviation of the height of another such body, as a share of what was seen: half as large
+again as it seems is two of them."""
 NEAREST, NUDGE = 0.05, 1e-4
-"""Metres ahead from which a lens can be taken out, and the slope over which its effect is taken."""
+"""Metres ahead from which a lens can be taken out, nearer than any camera sees, and the slope over
+which its effect is taken: so small that a lens is even over it, and large against rounding."""
 LASTING = np.array([0.023, 0.044, 0.027])
-"""Metres of the errors that stay: across, down, ahead."""
+"""Metres of the errors that stay: across, down, ahead. These and the following are such that true
+places and velocities lie in the ellipsoids as often as they should, see above."""
 FRESH = np.array([0.0185, 0.0185, 0.014])
 """Metres of the errors that are new after :data:`FRESH_TIME`."""
 FRESH_TIME = 0.1
@@ -66,9 +70,11 @@ WALKING = np.array([0.62, 0.28, 0.62])
 """Metres per second squared and square root of a hertz: white noise in the acceleration of somebody
 who walks, turns and stops."""
 SETTLE_TIME = 0.5
-"""Seconds in which the place of the middle in the outline is learned."""
+"""Seconds in which the place of the middle in the outline is learned: about a step, in which the
+arms go from one side to the other."""
 FIRST_SPEED = np.array([1.0, 0.2, 1.0])
-"""Metres per second of somebody whose motion is not known yet."""
+"""Metres per second of somebody whose motion is not known yet: a walk (1.4 m/s) in some direction
+over the floor, and hardly up or down."""
 
 
 @dataclass(frozen=True, slots=True)

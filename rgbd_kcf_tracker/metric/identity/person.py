@@ -30,7 +30,8 @@ SLOW, STANDS, SWAYING = 0.25, 0.7, 0.4
 """Metres a second below which a person stands, the probability that he goes on standing, and metres
 a second by which his next place is unknown if he does."""
 VELOCITY_TIME = 0.3
-"""Seconds after which a velocity is two thirds of what the sightings since then tell."""
+"""Seconds after which a velocity is two thirds of what the sightings since then tell: two frames at
+5 Hz, since one alone may be off by as much as a step."""
 RECENT = 1.5
 """Seconds between two sightings that tell a velocity: successive ones at 1 Hz, late ones as well;
 in more of them somebody has turned."""
@@ -40,7 +41,8 @@ FASTEST, MISPLACED = 3.0, 0.8
 """Metres a second at which nobody walks, and metres by which the places of two parts of one person
 differ."""
 FORGET = 3.0
-"""Seconds after which two thirds of where somebody was is forgotten."""
+"""Seconds after which two thirds of where somebody was is forgotten: by then a walker has crossed
+what a camera sees (:data:`ROOM_AREA`)."""
 TRAVELLED = 0.5
 """Metres that a thing which was moved, or the noise of one, does not travel."""
 BEYOND, EMPTY = 0.3, 0.5

@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 
 ENOUGH = 1.5
-"""Sightings, counted by how much showed, from which they are believed."""
+"""Sightings, counted by how much showed, from which they are believed: more than any one of them,
+which may be of a mixed outline."""
 LATELY = 1.5
 """Seconds after which a sighting says a third of what it said: at first often little of somebody
 shows, or somebody else beside him, and a number may have gone over from one to another."""
 AGAIN = 0.25
-"""What twice as many sightings say more, as a share of what one says."""
+"""What twice as many sightings say more, as a share of what one says: little, as those that follow
+each other show nearly the same."""
 
 
 class Tally:

@@ -38,9 +38,11 @@ equations, so ninety are plenty even where half are on somebody; the distance sp
 view, as one poster would not tell a turn from a step aside."""
 LEAST_CORNERS = 12
 LEAST_AGREEING = 0.4
-"""Corners that must agree on a motion for it to be believed, and their share of all."""
+"""Corners that must agree on a motion for it to be believed, four times as many equations as it has
+unknowns, and their share of all: people may fill half of the view."""
 AGREE = 1.5
-"""Pixels of the view within which a corner agrees."""
+"""Pixels of the view within which a corner agrees: flow is good to a part of one, and a corner's
+depth may be that of either side of an edge."""
 ITERATIONS = 8
 """Rounds of fitting. In the first four the pixels within which a corner counts fall from 4 to 0.7,
 so that those on somebody who walks come to count little; four more at that settle the motion."""

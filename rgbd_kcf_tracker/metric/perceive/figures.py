@@ -28,7 +28,7 @@ LEAST_PIXELS = 12
 """Pixels of the view, three by four, below which a piece is noise, too: beyond some 3.6 m these are
 more than :data:`LEAST_PIECE`."""
 LEAST_PIECE = 0.004
-"""Square metres below which a piece is noise."""
+"""Square metres below which a piece is noise: a patch of some 6 cm, smaller than a hand."""
 LEAST_AREA = 0.06
 """Square metres from which something is a figure: about a head and a shoulder."""
 LEAST_HEIGHT = 0.35
@@ -38,7 +38,8 @@ one."""
 DEPTH_STEP, DEPTH_STEP_PER_METRE = 0.25, 0.03
 """Metres in depth between two pieces of one person: an arm's reach, and the sensor's noise."""
 GAP_ABOVE, GAP_BESIDE = 0.35, 0.05
-"""Metres between two pieces of one person, above each other and beside."""
+"""Metres between two pieces of one person, above each other, which a table's edge or an arm may
+hide, and beside: a seam without a reading."""
 WIDEST, TALLEST = 0.9, 2.2
 """Metres of a person with arms half spread, and of a tall one."""
 UPRIGHT = 1.0

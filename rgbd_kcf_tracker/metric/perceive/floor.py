@@ -21,13 +21,17 @@ from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 MIN_UPRIGHT = 0.75
-"""Cosine of the largest tilt between the camera's down axis and the floor's normal."""
+"""Cosine of the largest tilt between the camera's down axis and the floor's normal: 41 degrees,
+steeper than a robot or a wall's camera looks that sees somebody from head to foot, and far from any
+wall's 90."""
 CAMERA_HEIGHT = (0.25, 3.5)
-"""Metres the camera may stand above the floor."""
+"""Metres the camera may stand above the floor: from a small robot's to one under a high ceiling."""
 MIN_SHARE = 0.06
-"""Least share of the sampled pixels that must lie on the floor."""
+"""Least share of the sampled pixels that must lie on the floor: as little as shows between
+furniture and people."""
 BELOW = -2.5
-"""Elevation, in units of the readings' noise, from which something lies below the floor."""
+"""Elevation, in units of the readings' noise, from which something lies below the floor: by chance
+hardly a reading in a hundred does."""
 TRIALS = 96
 """Planes through three readings that are tried: where a third of the readings are of the floor, all
 three of one of them are with a probability of 97 %. Where none is found it is tried again some

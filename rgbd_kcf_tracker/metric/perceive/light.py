@@ -20,12 +20,14 @@ from rgbd_kcf_tracker.arrays import Image
 DARKEST, BRIGHTEST = 12, 243
 """Values between which a channel is neither noise nor saturated."""
 LEAST_PIXELS = 60
-"""Pixels of the room, at every fifth row and column, from which the light is told."""
+"""Pixels of the room, at every fifth row and column, from which the light is told: enough that its
+median is no chance of one thing that moved."""
 STRIDE = 5
 """Rows and columns of which one is read: more than a thousand pixels remain of the view, which is
 enough for a median, and light changes no single pixel."""
 UNCHANGED = 0.02
-"""Gain up to which nothing is done."""
+"""Gain up to which nothing is done: a fraction of one of the levels that colours are told apart
+by."""
 LARGEST_GAIN = 8.0
 """Three stops of exposure: in a picture that is darker yet, most lies below :data:`DARKEST` and
 comes out in steps of eight levels, so that its colours tell nothing."""

@@ -12,21 +12,24 @@ from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 BREADTH = 0.4
-"""Metres between the heads of two people side by side, at the least."""
+"""Metres between the heads of two people side by side, at the least: shoulders are about as
+broad."""
 BROAD = BREADTH + 0.25
 """Metres from which a figure may be two people: those, and half a shoulder's width on each side."""
 VALLEY = 0.08
 """Metres by which the outline must fall between two heads."""
 HEAD_BELOW = 0.5
-"""Metres by which one head may be below another in one figure."""
+"""Metres by which one head may be below another in one figure: a child's, or that of somebody who
+sits."""
 REACH_ACROSS, REACH_DEEP = 0.2, 0.15
 """Half of a person's breadth and depth in metres: the scales in which pixels are nearest to one."""
 APART = 0.28
-"""Metres between the middles of two people, at the least."""
+"""Metres between the middles of two people, at the least: a chest is 0.25 m deep."""
 EVERY = 3
 """One in so many pixels is enough to tell where the middles of people are."""
 LEAST_SHARE = 0.15
-"""Share of a figure's pixels below which a part of it is not somebody."""
+"""Share of a figure's pixels, against an equal part of it for each, below which a part of it is not
+somebody: an arm."""
 NOBODY = np.zeros((0, 2))
 """Where people are expected while nobody is."""
 

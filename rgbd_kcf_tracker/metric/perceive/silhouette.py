@@ -16,9 +16,11 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 NEARER = 0.1
 NEARER_PER_METRE = 0.03
-"""Metres by which what lies beside a silhouette must be nearer to be hiding more of it."""
+"""Metres by which what lies beside a silhouette must be nearer to be hiding more of it: more than
+the relief of a body and the noise of far readings."""
 RING = 2
-"""Pixels of the view beyond the outline in which something nearer is looked for."""
+"""Pixels of the view beyond the outline in which something nearer is looked for: one beyond the
+seam that often lies between two surfaces."""
 CUT_SHARE = 0.3
 """Share of one side's outline beside which something nearer must lie for that side to be cut."""
 UPPER = 0.98

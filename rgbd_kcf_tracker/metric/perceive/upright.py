@@ -44,15 +44,18 @@ deep: less where hair gives no reading, more with a hood and the blur of depth a
 Shoulders are 0.35 to 0.5 m wide, less half turned, more with arms beside them; a trunk is 0.2 m
 deep from the side."""
 BROADER = 1.35
-"""Shoulders against head, at the least."""
+"""Shoulders against head, at the least: seen from the front they are twice as broad, half turned
+less."""
 SLENDER, STOUTER = 0.75, 0.8
 """Neck against head, at the most, and trunk against head, at the least."""
 SLIM = 0.85
-"""Width against height, at the most, where nothing is cut off below."""
+"""Width against height, at the most, where nothing is cut off below: arms half spread; what is as
+broad as high is furniture."""
 FILL = 0.45
 """Share of the box that a body fills, at the least: a rack or a plant fills less."""
 LENGTH = (1.2, 0.8)
-"""Metres of a person whose shape is not told: whole, and cut off above or below."""
+"""Metres of a person whose shape is not told: whole, a child of seven, and cut off above or below,
+as much as from head to hips."""
 
 
 def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
