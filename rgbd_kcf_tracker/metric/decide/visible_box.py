@@ -24,7 +24,8 @@ SLIMMEST = 0.4
 """Width of a body against its height, at the least, where it has never been seen whole: somebody
 whose arms hang down."""
 LIKE = 0.25
-"""Share of a column's pixels in the body's colours up to which it is taken to go on."""
+"""Share of a column's pixels in the body's colours down to which it is taken to go on: between arm
+and trunk shows as much of what is behind. At 0.18 and 0.35 no walk of the recordings is another."""
 
 
 def outline_box(scene: Scene, seen: Silhouette) -> Box:

@@ -27,7 +27,8 @@ MAX_RATE = 0.15
 seconds on. One picture, which may show a turned or half hidden target, is not to be most of what is
 known."""
 COLOR_RATE = 2.0
-"""How much faster than the filter the colours are learned."""
+"""How much faster than the filter the colours are learned: light and the side that shows change
+them sooner than the shape."""
 MEAN_TIME = 0.7
 """Seconds over which the mean peak is taken: some frames at 5 Hz, so that no single one says what
 is usual."""

@@ -49,7 +49,8 @@ BEYOND, EMPTY = 0.3, 0.5
 """Metres behind the last sight of somebody at which the camera sees past its place, and the share
 of its outline where it does so if it has gone."""
 ANYWHERE = 0.02
-"""Probability that somebody just seen is anywhere by now (mistaken before, or hidden)."""
+"""Probability that somebody just seen is anywhere by now (mistaken before, or hidden): of some
+fifty boxes one is on something else."""
 
 
 class Person:
