@@ -226,6 +226,8 @@ def test_scores_on_real_and_simulated_data_apart():
     assert real[f'{sure}: on the target %'] == pytest.approx(100 / 3)
     assert simulated[f'{sure}: on the target %'] == simulated[f'{sure}: right %'] == 100
     assert len(plots.honesty_plot(found)) > 1000
+    curves = [np.array([0.34, 1.0, np.nan]), np.array([0.999, 1.0])]
+    assert [plots.least_shown(curves[i:]) for i in (0, 1)] == [0.3, 0.9]
     assert len(plots.reliability_plot(found)) > 1000
 
 

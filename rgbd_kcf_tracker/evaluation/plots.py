@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -165,13 +166,19 @@ def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
             label=f'{tracker}, {data} data',
         )  # fmt: skip
     axes.axvline(SURE, color='#888888', lw=0.8, ls=':')
+    low = least_shown(scored.on_target.shares for scored in found.values())
     axes.set(
-        xlim=(0, 1), ylim=(0, 1.02), xlabel='score and above', ylabel='boxes on the target',
-        title='What a score is worth',
+        xlim=(0, 1), ylim=(low, 1 + 0.02 * (1 - low)), xlabel='score and above',
+        ylabel='boxes on the target', title='What a score is worth',
     )  # fmt: skip
     plot_style.tidy(axes)
     axes.legend(fontsize=8, frameon=False, loc='lower left')
     return plot_style.png(figure)
+
+
+def least_shown(curves: Iterable[FloatArray]) -> float:
+    """Where an axis of shares is to begin, so that curves near 1 can be told apart."""
+    return min(0.9, *(math.floor(10 * np.nanmin(curve)) / 10 for curve in curves))
 
 
 def expected_overlap_plot(
