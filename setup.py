@@ -36,7 +36,8 @@ VIDEO = ['imageio-ffmpeg']
 VIEW = ['aiohttp>=3.8']
 TOOLS = [*REPORT, *VIDEO, 'tqdm', 'psutil']
 CLUSTER = ['distributed>=2022.12', 'threadpoolctl']
-PARQUET = ['pyarrow']
+# pyarrow 26 refuses NumPy 1.26, which Ubuntu has; later Pythons have no NumPy 1.
+PARQUET = ['pyarrow<26; python_version < "3.13"', 'pyarrow; python_version >= "3.13"']
 TEST = [
     'pytest>=8',
     'pytest-timeout',

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from importlib import import_module
 
 from rgbd_kcf_tracker.errors import MissingExtraError
 
@@ -25,7 +25,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 def require(extra: str, purpose: str) -> None:
-    """Make sure that the libraries of an extra are there, without importing them.
+    """Make sure that the libraries of an extra are there and fit the others that are installed.
 
     Args:
         extra: its name.
@@ -34,7 +34,16 @@ def require(extra: str, purpose: str) -> None:
     Raises:
         MissingExtraError: saying what to install.
     """
-    missing = [name for name in EXTRAS[extra][0] if find_spec(name) is None]
+    missing = []
+    for name in EXTRAS[extra][0]:
+        try:
+            import_module(name)
+        except ModuleNotFoundError:
+            missing.append(name)
+        except ImportError as error:  # as of a pyarrow that wants another NumPy
+            raise MissingExtraError(
+                f'{purpose}: {name} cannot be imported ({error}): {how_to_get(extra)}'
+            ) from None
     if missing:
         raise MissingExtraError(f'{purpose} needs {", ".join(missing)}: {how_to_get(extra)}')
 

@@ -303,6 +303,7 @@ def test_outputs_that_cannot_be(
     assert 'is the source itself' in fails(capsys, 'track', source, '--bag', source)
     assert 'is the source itself' in fails(capsys, 'convert', source, source)
     assert 'must end in .mcap' in fails(capsys, 'convert', source, tmp_path / 'a.bag')
+    assert '--table parquet' in fails(capsys, 'track', source, '--output', tmp_path / 'a.parquet')
     assert source.read_bytes() == before
 
 

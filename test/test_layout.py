@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from rgbd_kcf_tracker.extras import EXTRAS
+from rgbd_kcf_tracker.errors import MissingExtraError
+from rgbd_kcf_tracker.extras import EXTRAS, require
 
 PACKAGE = 'rgbd_kcf_tracker'
 ROOT = Path(__file__).resolve().parent.parent
@@ -223,6 +224,17 @@ def test_extras_are_those_of_the_installation() -> None:
         assert line is not None
         for module in modules:
             assert f"'{names.get(module, module)}" in line[1], f'{module} is not in {extra}'
+
+
+def test_an_extra_that_does_not_fit_is_told_before_it_is_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As pyarrow 26 beside NumPy 1.26."""
+    (tmp_path / 'pyarrow.py').write_text("raise ImportError('pyarrow requires NumPy 2.0')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, 'pyarrow', raising=False)
+    with pytest.raises(MissingExtraError, match=r'requires NumPy 2\.0.*_tracker\[parquet\]'):
+        require('parquet', '--table parquet')
 
 
 WITHOUT = """

@@ -342,6 +342,11 @@ def _check_outputs(args: argparse.Namespace) -> None:
     from rgbd_kcf_tracker.recordings.video import require_video
 
     require_source(args.source)
+    if args.output and args.output.endswith('.parquet'):
+        raise ParameterError(
+            f'--output {args.output} would be CSV: Parquet is written into a folder, '
+            'by --table parquet --output FOLDER'
+        )
     outputs = {f'--{name}': getattr(args, name) for name in ('output', 'mot', 'video', 'bag')}
     written = {option: path for option, path in outputs.items() if path and path != '-'}
     check_outputs(written, [args.source], args.overwrite)
