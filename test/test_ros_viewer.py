@@ -263,12 +263,14 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         assert all(0 <= share <= 1 for share in confused)
         # No pictures any more: the page says so, until they come again.
         page.until("document.getElementById('banner').innerText.includes('No picture for')")
-        assert page.value("document.getElementById('state').innerText") == 'waiting'
+        assert page.value("document.getElementById('state').innerText") == 'no pictures'
+        said = page.value("document.getElementById('no-targets').innerText")
+        assert said == 'The pictures have stopped.'
         assert page.value('page.shown.targets.length') == 0
         assert page.value("document.querySelectorAll('#targets li').length") == 0
         play_hidden(rig, range(at + 20, at + 23))
         page.until("document.getElementById('banner').hidden")
-        assert page.value("document.getElementById('state').innerText") != 'waiting'
+        assert page.value("document.getElementById('state').innerText") != 'no pictures'
         assert page.errors == []
         page.open('about:blank')
         rig.wait(lambda: not node._outputs.wanted('evidence'))

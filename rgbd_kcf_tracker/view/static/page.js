@@ -99,9 +99,9 @@ function showWords(shown) {
   $('state').dataset.state = worst;
   const some = chosen.length > 1 ? `${states.filter(s => s === worst).length} of ${states.length} ` : '';
   $('state').textContent = some + STATE_WORDS[worst] + (others ? `, ${others} ${others === 1 ? 'other' : 'others'}` : '');
-  if (shown.silent) {
+  if (page.waiting || shown.silent) {
     $('state').dataset.state = 'idle';
-    $('state').textContent = 'tracker silent';
+    $('state').textContent = page.waiting ? 'no pictures' : 'tracker silent';
   }
   const recent = page.entries.slice(-30);
   const mean = name => recent.reduce((sum, e) => sum + (e[name] || 0), 0) / Math.max(1, recent.length);
@@ -173,6 +173,7 @@ function make(tag, className, words) {
 function showTargets(shown) {
   const chosen = shown.targets.filter(t => t.chosen);
   $('no-targets').hidden = chosen.length > 0;
+  $('no-targets').textContent = page.waiting ? 'The pictures have stopped.' : shown.silent ? 'The tracker is silent.' : 'Nobody is followed yet.';
   showPeople($('targets'), chosen);
   showPeople($('others'), shown.targets.filter(t => !t.chosen));
   const variant = page.hello && page.hello.variants.find(v => v.name === shown.variant);
@@ -460,13 +461,12 @@ function watchForPictures() {
     if (!page.hello || !page.hello.live || !open || document.hidden) return;
     const seconds = (performance.now() - page.last) / 1000;
     if (seconds < 3 + 2 * page.hello.period) return;
-    if (!page.waiting && page.shown) {
+    const before = page.waiting;
+    page.waiting = true;
+    if (!before && page.shown) {
       page.shown.targets = [];
       redraw();
     }
-    page.waiting = true;
-    $('state').dataset.state = 'idle';
-    $('state').textContent = 'waiting';
     say(`No picture for ${Math.round(seconds)} s: is the camera running, and the viewer's color/image remapped to it?`);
   }, 1000);
 }
