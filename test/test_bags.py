@@ -431,9 +431,17 @@ def test_an_empty_bag_lists_what_it_has(kind: str, tmp_path: Path) -> None:
         read(path)
 
 
-def test_metadata_that_lies_is_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    'text',
+    [
+        ': : {{{ not yaml',
+        'rosbag2_bagfile_information: {relative_file_paths: 5}',
+        'rosbag2_bagfile_information: {relative_file_paths: a.mcap}',
+    ],
+)
+def test_metadata_that_lies_is_left_out(text: str, tmp_path: Path) -> None:
     folder = write_rosbag2(tmp_path / 'a', camera_messages(FRAMES))
-    (folder / 'metadata.yaml').write_text(': : {{{ not yaml')
+    (folder / 'metadata.yaml').write_text(text)
     frames, warnings = read(folder)
     assert_same_frames(frames, FRAMES)
     assert any('cannot be understood' in w for w in warnings)
@@ -446,6 +454,9 @@ def test_a_file_that_metadata_names_is_missing(tmp_path: Path) -> None:
     frames, warnings = read(folder)
     assert_same_frames(frames, FRAMES)
     assert any('names b.mcap, which is not there' in w for w in warnings)
+    (folder / 'a.mcap').unlink()
+    with pytest.raises(RecordingError, match=r'none of the files .* names: b\.mcap$'):
+        read(folder)
 
 
 def test_a_database_that_was_never_checkpointed(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.recordings.sqlite_storage import SqliteStorage
 from rgbd_kcf_tracker.recordings.storage import Definition, Storage, Topic, header_stamp
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
+_PARTS = 'relative_file_paths'
 _SUFFIXES = ('.mcap', '.db3', '.bag')
 
 
@@ -144,7 +145,7 @@ class RawBag:
         metadata = self._metadata()
         names: list[str] = []
         if metadata:
-            names = [Path(str(name)).name for name in metadata.get('relative_file_paths') or ()]
+            names = [Path(str(name)).name for name in metadata.get(_PARTS) or ()]
             mode = str(metadata.get('compression_mode') or '').lower()
             if mode == 'message':
                 self._message_method = str(metadata.get('compression_format') or 'zstd')
@@ -152,9 +153,12 @@ class RawBag:
         present = {p.name: p for p in inside if p.name.removesuffix('.zstd').endswith(_SUFFIXES)}
         missing = [name for name in names if name not in present]
         if missing:
-            self.warnings.append(
-                f'{self.path}: metadata.yaml names {", ".join(missing)}, which is not there'
-            )
+            shown = ', '.join(missing[:5]) + (' ...' if len(missing) > 5 else '')
+            if not present:
+                raise RecordingError(
+                    f'{self.path} holds none of the files that its metadata.yaml names: {shown}'
+                )
+            self.warnings.append(f'{self.path}: metadata.yaml names {shown}, which is not there')
         found = [present[n] for n in names if n in present] + [
             p for n, p in present.items() if n not in names
         ]
@@ -181,7 +185,10 @@ class RawBag:
             return {}
         try:
             content = yaml.safe_load(read_text(path))
-            return cast('dict[str, Any]', dict(content['rosbag2_bagfile_information']))
+            information = dict(content['rosbag2_bagfile_information'])
+            if not isinstance(information.get(_PARTS, []), list | None):
+                raise TypeError(_PARTS)
+            return information
         except (RecordingError, RecursionError, ValueError, TypeError, KeyError, yaml.YAMLError):
             self.warnings.append(f'{path} cannot be understood: it is left out')
             return {}
