@@ -51,7 +51,10 @@ class Stop:
     def find_spec(self, name, *rest):
         if name == wanted:
             sys.meta_path.remove(self)
-            os.kill(os.getpid(), signal.SIGINT)
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+            except KeyboardInterrupt as error:  # as NumPy's compiled parts do
+                raise ImportError('initialization failed') from error
 sys.meta_path.insert(0, Stop())
 from rgbd_kcf_tracker.cli.main import main
 sys.exit(main())
@@ -75,7 +78,8 @@ def test_while_the_program_starts(module: str, walk: Path, tmp_path: Path) -> No
     )  # fmt: skip
     assert done.returncode == 130, done.stderr
     assert done.stderr == 'rgbd-kcf: interrupted\n'
-    assert [p.name for p in tmp_path.iterdir()] == ['a.mcap']
+    left = {p.name for p in tmp_path.iterdir()}
+    assert {'a.mcap'} <= left <= {'a.mcap', 'a.csv', 'out.mcap'}, 'whole rows, if any'
 
 
 def test_the_first_waits_for_the_step_and_the_second_does_not() -> None:

@@ -5,11 +5,13 @@
 
 An exception that comes up anywhere can come up in a record that is half written, or in a callback
 of a library that swallows it. So while work is under way the first Ctrl-C is only noted, and the
-work asks for it between its steps; the second one does not wait.
+work asks for it between its steps; the second one does not wait. What comes up while a module is
+imported is lost too, or made an ``ImportError``: such a one comes again a moment later.
 """
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 from collections.abc import Iterator
@@ -17,6 +19,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 EXIT_INTERRUPTED = 130
+_LATER_S, _LATER_TIMES = 0.002, 1000
 
 
 class Interrupts:
@@ -27,6 +30,7 @@ class Interrupts:
         """Whether it was pressed."""
         self._held = False
         self._notice = ''
+        self._later = 0
 
     @contextmanager
     def handled(self) -> Iterator[None]:
@@ -37,6 +41,7 @@ class Interrupts:
             and before is signal.default_int_handler
         )
         self.asked = False
+        self._later = _LATER_TIMES
         if ours:
             signal.signal(signal.SIGINT, self._handle)
         try:
@@ -65,6 +70,10 @@ class Interrupts:
             raise KeyboardInterrupt
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
+        if (self.asked or not self._held) and self._later and _is_importing(frame):
+            self._later -= 1
+            threading.Timer(_LATER_S, _thread.interrupt_main).start()
+            return
         again, self.asked = self.asked, True
         if again or not self._held:
             raise KeyboardInterrupt
@@ -72,6 +81,14 @@ class Interrupts:
             import sys
 
             print(self._notice, file=sys.stderr, flush=True)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith('<frozen importlib'):
+            return True
+        frame = frame.f_back
+    return False
 
 
 interrupts = Interrupts()
