@@ -255,6 +255,10 @@ def test_bad_sources(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         assert 'does not exist' in fails(capsys, *command, tmp_path / 'none', *dest)
         (tmp_path / 'letter.mcap').write_text('Dear reader, this is no recording.')
         assert 'is no recording' in fails(capsys, *command, tmp_path / 'letter.mcap', *dest)
+        # Fails to be read as on a disk that fails.
+        assert '/proc/self/mem cannot be read: Input' in fails(
+            capsys, *command, '/proc/self/mem', *dest
+        )
 
 
 def test_no_box_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

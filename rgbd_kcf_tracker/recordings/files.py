@@ -14,6 +14,7 @@ import os
 import stat
 from io import FileIO
 from pathlib import Path
+from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError
 
@@ -42,8 +43,22 @@ def require_source(path: str | os.PathLike[str]) -> None:
         raise RecordingError(f'{path} is {kind_of(mode)}: give a file or a folder')
 
 
+class _File(FileIO):
+    """Says which file it is where a disk fails."""
+
+    def read(self, size: int | None = -1, /) -> Any:
+        try:
+            return super().read(size)
+        except OSError as error:
+            raise RecordingError(cannot_read(self.name, error)) from None
+
+
+def _open(path: str, _: int) -> int:
+    return os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+
+
 def open_file(path: Path) -> FileIO:
-    """A regular file to read, without a buffer.
+    """A regular file to read, without a buffer; its ``read`` raises as this does.
 
     Raises:
         RecordingError: where it cannot be opened or is no regular file.
@@ -51,7 +66,7 @@ def open_file(path: Path) -> FileIO:
     # Looked at before it is opened: to open a device can have effects.
     _require_file(path, _stat(path).st_mode)
     try:
-        file = FileIO(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), 'r')
+        file = _File(path, 'r', opener=_open)
     except OSError as error:
         raise RecordingError(cannot_read(path, error)) from None
     try:
