@@ -334,3 +334,7 @@ def test_command_explains_a_recording(tmp_path: Path, capsys: pytest.CaptureFixt
     assert 'no trackers: give --variants' in capsys.readouterr().err
     assert main([*command, '--seed', '0', '--overwrite']) == 2
     assert '--seed means nothing with a SOURCE' in capsys.readouterr().err
+    (out / 'holiday.png').write_bytes(b'years of work')
+    assert main([*command, '--variants', 'kcf', '--overwrite']) == 2
+    assert 'holds holiday.png, which we did not write' in capsys.readouterr().err
+    assert (out / 'holiday.png').exists()

@@ -22,6 +22,7 @@ from matplotlib.mathtext import math_to_image
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.outputs import OutputFolder, cannot_write
+from rgbd_kcf_tracker.variants import VARIANTS
 from rgbd_kcf_tracker.view.explain.picture import Picture
 
 PAGE = 'index.html'
@@ -58,7 +59,8 @@ def write_page(
     Raises:
         RecordingError: where they cannot be written, or something is there already.
     """
-    output = OutputFolder(folder, (PAGE, VALUES, '*.png'), overwrite)
+    ours = (PAGE, VALUES, *(f'{name}_*.png' for name in VARIANTS))
+    output = OutputFolder(folder, ours, overwrite)
     try:
         names = _write_all(output.place, render(title, command, chapters), chapters)
     except BaseException as error:
