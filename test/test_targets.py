@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, picture
 
-from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
+from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
 from rgbd_kcf_tracker.insight import insight_in
 from rgbd_kcf_tracker.metric.by_look import ByLook
@@ -205,6 +205,25 @@ def test_a_removed_target_has_no_track_and_its_id_does_not_go_to_another(variant
     targets.update(frame)
     third = targets.add(frame, Box(5, 5, 30, 30))
     assert third not in (first, second)
+
+
+@pytest.mark.parametrize('every', [1, 2])
+def test_who_is_added_in_the_next_frame_leaves_others_where_they_are_in_it(every: int):
+    """They were learned from where they had been; in an image of another size that was nowhere."""
+    targets = TargetSet('metric')
+    first = targets.add(both(0), left(0).box)
+    follow(targets, range(1, 8))
+    frame = both(20)
+    assert frame.depth is not None
+    camera = Intrinsics(CAMERA.fx / every, CAMERA.fy / every, CAMERA.cx / every, CAMERA.cy / every)
+    color, depth = frame.color[::every, ::every], frame.depth[::every, ::every]
+    box = right(20).box.over(every)
+    second = targets.add(Frame(color, depth, frame.stamp_ns, camera), box)
+    assert targets.metric is not None
+    person = targets.metric.person(first)
+    assert person is not None
+    assert person.place[0] == pytest.approx(left(20).x, abs=0.1)
+    assert second != first
 
 
 def test_a_target_may_be_added_at_any_time():

@@ -89,8 +89,11 @@ class MetricTargets:
         require_inside(box, frame)
         self._learn()
         if self._frame is not frame:
-            self._perceive(frame)
-            self._unlearned = True
+            if self._followers:  # where they were in the last frame, others stand in this
+                self.update(frame)
+            else:
+                self._perceive(frame)
+                self._unlearned = True
             self._learn()
         follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
         if self.account is not None and follower.seen is not None:
