@@ -17,7 +17,7 @@ from people_rig import BLACK, CAMERA, COLS, DARK_RED, RED, ROWS, WALL, Someone, 
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
-from rgbd_kcf_tracker.metric.by_look import ByLook, Look
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look, depth_in
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.simulation import SimulatedFrame, simulate
 from rgbd_kcf_tracker.track import Track
@@ -173,6 +173,15 @@ def test_never_raises_on_odd_depth():
             track = tracker.update(frame)
             assert (track.box is None) == (track.state is not TrackState.TRACKING)
             assert 0 <= track.score <= 1
+
+
+def test_depth_without_end_is_no_depth_of_a_box():
+    frame = picture()
+    assert frame.depth is not None
+    box = Box(120, 60, 60, 140)
+    assert depth_in(frame, box) is not None
+    endless = np.full_like(frame.depth, np.inf)
+    assert depth_in(dataclasses.replace(frame, depth=endless), box) is None
 
 
 def test_stamps_may_stand_still_or_jump_back():

@@ -457,5 +457,5 @@ def depth_in(frame: Frame, box: Box) -> float | None:
     depth = frame.depth[
         int(middle.y) : int(middle.bottom) + 1 : step, int(middle.x) : int(middle.right) + 1 : step
     ]
-    valid = depth[depth > 0]
+    valid = depth[(depth > 0) & (depth < np.inf)]
     return float(np.median(valid)) if valid.size > MOST * depth.size else None
