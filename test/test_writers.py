@@ -285,8 +285,10 @@ def test_bag_in_metres_keeps_every_depth(tmp_path: Path) -> None:
         assert_same_frames(list(recording.frames()), [frame])
 
 
-def test_colour_alone_is_written_and_read(tmp_path: Path) -> None:
-    frame = Frame(make_frames(1)[0].color, None, 5)
+@pytest.mark.parametrize('stamp_ns', [5, -5_000_000_000])
+def test_colour_alone_is_written_and_read(stamp_ns: int, tmp_path: Path) -> None:
+    """Also before 1970: a clock that was not set, or of a simulator."""
+    frame = Frame(make_frames(1)[0].color, None, stamp_ns)
     with BagWriter(tmp_path / 'a.mcap') as writer:
         writer.write_frame(frame)
     with open_recording(tmp_path / 'a.mcap') as recording:

@@ -89,12 +89,13 @@ class McapWriter(FrameWriter):
             topic: where to.
             kind: its type, ``package/msg/Name``.
             data: the serialised message.
-            log_ns: time of recording.
+            log_ns: time of recording; MCAP has none before 1970, and takes 1970 for it.
             definition: text of the type; needed for types that ROS 2 Jazzy does not bring.
 
         Raises:
             RecordingError: where it cannot be written.
         """
+        log_ns = max(log_ns, 0)
         try:
             channel = self._channels.get(topic)
             if channel is None:
