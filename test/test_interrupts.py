@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -110,6 +111,23 @@ def test_one_that_a_library_swallows_is_not_forgotten() -> None:
             signal.raise_signal(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             next(iter(progress(range(5), 5, 'steps')))
+
+
+def test_one_in_a_callback_of_the_interpreter_comes_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Python would print it with its traceback and go on."""
+
+    def work() -> None:
+        thing: set[int] = set()
+        kept = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+        assert kept() is None
+        time.sleep(10)
+
+    with pytest.raises(KeyboardInterrupt), interrupts.handled():
+        work()
+    assert capsys.readouterr().err == ''
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:

@@ -6,13 +6,15 @@
 An exception that comes up anywhere can come up in a record that is half written, or in a callback
 of a library that swallows it. So while work is under way the first Ctrl-C is only noted, and the
 work asks for it between its steps; the second one does not wait. What comes up while a module is
-imported is lost too, or made an ``ImportError``: such a one comes again a moment later.
+imported can become an ``ImportError``, and what comes up in a callback of a weak reference is lost:
+such a one comes again a moment later.
 """
 
 from __future__ import annotations
 
 import _thread
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -42,13 +44,24 @@ class Interrupts:
         )
         self.asked = False
         self._later = _LATER_TIMES
+        tell = sys.unraisablehook
+
+        def lost(told: sys.UnraisableHookArgs) -> None:
+            if issubclass(told.exc_type, KeyboardInterrupt):
+                self._come_again()
+            else:
+                tell(told)
+
         if ours:
             signal.signal(signal.SIGINT, self._handle)
+            sys.unraisablehook = lost
         try:
             yield
         finally:
+            self._later = 0
             if ours:
                 signal.signal(signal.SIGINT, before)
+                sys.unraisablehook = tell
 
     @contextmanager
     def held(self, notice: str = '') -> Iterator[None]:
@@ -71,16 +84,21 @@ class Interrupts:
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         if (self.asked or not self._held) and self._later and _is_importing(frame):
-            self._later -= 1
-            threading.Timer(_LATER_S, _thread.interrupt_main).start()
+            self._come_again()
             return
         again, self.asked = self.asked, True
         if again or not self._held:
             raise KeyboardInterrupt
         if self._notice:
-            import sys
-
             print(self._notice, file=sys.stderr, flush=True)
+
+    def _come_again(self) -> None:
+        def again() -> None:
+            if self._later > 0:  # else all has ended meanwhile
+                _thread.interrupt_main()
+
+        self._later -= 1
+        threading.Timer(_LATER_S, again).start()
 
 
 def _is_importing(frame: FrameType | None) -> bool:
