@@ -25,7 +25,8 @@ SLIMMEST = 0.4
 whose arms hang down."""
 LIKE = 0.25
 """Share of a column's pixels in the body's colours down to which it is taken to go on: between arm
-and trunk shows as much of what is behind. At 0.18 and 0.35 no walk of the recordings is another."""
+and trunk shows as much of what is behind. At 0.18 and 0.35 the means over the real walks are the
+same."""
 
 
 def outline_box(scene: Scene, seen: Silhouette) -> Box:
