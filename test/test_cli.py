@@ -381,6 +381,14 @@ def test_info(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert info['frames'] == 3
     roles = {s['name']: s['role'] for s in info['streams']}
     assert roles[COLOR] == 'color'
+    several = write_folder(tmp_path / 'several', count=3)
+    (several / 'groundtruth.txt').unlink()
+    (several / 'mot.txt').write_text('1,1,2,2,5,5,1\n1,2,9,2,5,5,1\n3,-1,9,2,5,5,1\n')
+    assert main(['info', str(several)]) == 0
+    assert 'ground truth  1 frames with a box' in capsys.readouterr().out
+    (several / 'mot.txt').write_text('1,1,2\n')
+    assert main(['info', str(several)]) == 0
+    assert 'mot.txt, line 1' in capsys.readouterr().out
     source = write_mcap(tmp_path / 'b.mcap', camera_messages(make_frames(3), depth=None))
     assert main(['info', str(source)]) == 0
     assert 'warning: no depth was recorded: read as colour alone' in capsys.readouterr().out

@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.bench.altered import make_copy, names_of, parser_of, write
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
-from rgbd_kcf_tracker.recordings.mot import Sightings, mot_text
+from rgbd_kcf_tracker.recordings.mot import MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS
 
 
@@ -61,7 +61,7 @@ def pause(
         for person in people.get(index, ()):
             rows.append((number, person.id, person.box.as_tuple(), float(person.counts)))
     (out / 'timestamps.txt').write_text(''.join(f'{stamp}\n' for stamp in stamps))
-    (out / 'mot.txt').write_text(mot_text(Sightings.of(*zip(*rows, strict=True))))
+    (out / MOT_FILE).write_text(mot_text(Sightings.of(*zip(*rows, strict=True))))
     for name in (INTRINSICS, CAMERA_INFO):
         beside = frames.colors[0].parent.parent / name
         if beside.is_file():

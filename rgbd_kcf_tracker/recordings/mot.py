@@ -32,6 +32,9 @@ from rgbd_kcf_tracker.track import Track
 
 Integers = npt.NDArray[np.int64]
 
+MOT_FILE = 'mot.txt'
+"""In a folder with a sequence: everyone in it."""
+
 REGION_ID = -1
 """In ground truth: the box is no person but a region in which nothing is judged."""
 

@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import millimetres
-from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, Sightings, mot_text
+from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write, part_of
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, format_box
 
@@ -34,7 +34,7 @@ _FILES = (
     'groundtruth.txt',
     'groundtruth_body.txt',
     'visible.txt',
-    'mot.txt',
+    MOT_FILE,
     'groundtruth_*.txt',
     'body_*.txt',
     'visible_*.txt',
@@ -193,7 +193,7 @@ class SequenceWriter(FrameWriter):
             [float(truth.visible_fraction >= BARELY_VISIBLE) for truth in shown.values()],
             positions=[truth.position for truth in shown.values()],
         )
-        self._write('mot.txt', mot_text(rows))
+        self._write(MOT_FILE, mot_text(rows))
 
     def _show(self, name: str, part: Path) -> None:
         try:

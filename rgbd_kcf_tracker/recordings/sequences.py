@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.recordings.imagefiles import (
     even_stamps,
     image_files,
 )
+from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.recording import (
     NO_DEPTH,
     Closing,
@@ -108,7 +109,16 @@ class SequenceFolder(Closing):
         ):
             if boxes is not None:
                 streams.append(StreamInfo(name, 'boxes', len(boxes), role='truth'))
-        truth = self.groundtruth
+        truth, warnings = self.groundtruth, list(self.warnings)
+        shown = None if truth is None else sum(box is not None for box in truth)
+        several = self.path / MOT_FILE
+        if truth is None and several.is_file():
+            try:
+                rows = read_mot(several, len(self), regions=True)
+                streams.append(StreamInfo(MOT_FILE, 'people', len(rows.ids), role='truth'))
+                shown = len(set(rows.frames[rows.ids != REGION_ID].tolist()))
+            except RecordingError as error:
+                warnings.append(str(error))
         return RecordingInfo(
             path=self.path,
             kind='sequence folder',
@@ -118,8 +128,8 @@ class SequenceFolder(Closing):
             rate_hz=rate,
             streams=tuple(streams),
             intrinsics=self.intrinsics,
-            truth_frames=None if truth is None else sum(b is not None for b in truth),
-            warnings=tuple(self.warnings),
+            truth_frames=shown,
+            warnings=tuple(warnings),
         )
 
     def close(self) -> None:

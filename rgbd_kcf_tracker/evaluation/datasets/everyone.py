@@ -27,7 +27,6 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     group,
 )
 from rgbd_kcf_tracker.evaluation.datasets.folder import (
-    MOT_FILE,
     people_files,
     read_fractions,
     read_frames,
@@ -35,7 +34,7 @@ from rgbd_kcf_tracker.evaluation.datasets.folder import (
 from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, with_truth
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, image_files
-from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, read_mot
+from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes
 
 IMAGE_FOLDERS = ('rgb', 'color', 'img1', 'img')

@@ -36,7 +36,7 @@ from rgbd_kcf_tracker.recordings.imagefiles import (
     even_stamps,
     image_files,
 )
-from rgbd_kcf_tracker.recordings.mot import REGION_ID, read_mot
+from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import (
     CAMERA_INFO,
     INTRINSICS,
@@ -50,7 +50,6 @@ TAIL_FRAMES = 15
 """Frames after a person was last seen that still count: the tracker must say that they are gone."""
 
 _BODY = 'groundtruth_body.txt'
-MOT_FILE = 'mot.txt'
 _PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', INTRINSICS, CAMERA_INFO)
 
 
