@@ -185,23 +185,28 @@ def _timed(work: Callable[[], None]) -> tuple[float, float]:
     return time.perf_counter() - began, time.process_time() - spent
 
 
+def counts(text: str) -> list[int]:
+    """Whole numbers above 0, as in ``1,2,4``; a ValueError for anything else."""
+    numbers = [int(part) for part in text.split(',')]
+    if min(numbers) < 1:
+        raise ValueError(text)
+    return numbers
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Print the tables."""
     parser = argparse.ArgumentParser(description='what more workers bring, and what they cost')
-    parser.add_argument('--processes', default='1,2', metavar='N,...')
-    parser.add_argument('--workers', default='4,16,64', metavar='N,...')
+    parser.add_argument('--processes', type=counts, default=[1, 2], metavar='N,...')
+    parser.add_argument('--workers', type=counts, default=[4, 16, 64], metavar='N,...')
     parser.add_argument('--scenes', default='sim:normal,occlusion,crossing,clutter:1-2')
     parser.add_argument('--duration', type=float, default=3.0, metavar='S')
     parser.add_argument('--jobs-each', type=int, default=10, metavar='N')
     parser.add_argument('--job', type=float, default=2.0, metavar='S', help='of a waiting job')
     args = parser.parse_args(argv)
-    processes, brought = measure_processes(
-        [int(n) for n in args.processes.split(',')], args.scenes, args.duration
-    )
+    processes, brought = measure_processes(args.processes, args.scenes, args.duration)
     print(f'{processes.text()}\na job brings back {brought / 1024:.0f} KiB\n')
     print(measure_coordinator([0, brought], 300).text() + '\n')
-    workers = [int(n) for n in args.workers.split(',')]
-    print(measure_cluster(workers, args.jobs_each, args.job, brought).text())
+    print(measure_cluster(args.workers, args.jobs_each, args.job, brought).text())
     return 0
 
 
