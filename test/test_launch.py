@@ -174,6 +174,19 @@ def test_a_mistyped_argument_starts_nothing(
         started(f'{file}.launch.py', **given)
 
 
+def test_a_misspelt_argument_is_told(
+    launch_modules: None, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Not refused: it may be one of a launch file that includes this one."""
+    found = runpy.run_path(str(PROJECT / 'launch' / 'tracker.launch.py'))
+    given = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
+    given |= {'variatn': 'kcf', 'ros_namespace': '', 'bag': 'walk.mcap'}
+    found['start'](SimpleNamespace(launch_configurations=given))
+    assert [record.getMessage() for record in caplog.records] == [
+        'launch argument variatn is none of ours: did you mean variant?'
+    ]
+
+
 def test_a_profile_may_say_how_its_images_arrive(launch_modules: None, tmp_path: Path) -> None:
     path = tmp_path / 'cameras.yaml'
     path.write_text(

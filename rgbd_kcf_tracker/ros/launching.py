@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import difflib
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +18,7 @@ from launch.substitutions import LaunchConfiguration
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.live.camera_profiles import CameraProfile, camera_profile, load_cameras
 
+_LOG = logging.getLogger('launch')  # launch's own
 N = TypeVar('N', int, float)
 CONFIG = Path(get_package_share_directory('rgbd_kcf_tracker'), 'config')
 Arguments = Mapping[str, 'tuple[str | None, str]']
@@ -46,7 +49,14 @@ def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
 
 
 def given(arguments: Arguments, context: Any) -> dict[str, str]:
-    """What was given for each argument."""
+    """What was given for each argument; one that looks misspelt is told, for launch ignores it.
+
+    It may be of a launch file around this one, so it is no error.
+    """
+    for name in set(context.launch_configurations) - set(arguments):
+        near = difflib.get_close_matches(name, arguments, n=1, cutoff=0.85)
+        if near:
+            _LOG.warning('launch argument %s is none of ours: did you mean %s?', name, near[0])
     return {name: LaunchConfiguration(name).perform(context) for name in arguments}
 
 
