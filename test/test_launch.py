@@ -182,7 +182,7 @@ def test_a_misspelt_argument_is_told(
     given = {name: default for name, (default, _) in found['ARGUMENTS'].items()}
     given |= {'variatn': 'kcf', 'ros_namespace': '', 'bag': 'walk.mcap'}
     found['start'](SimpleNamespace(launch_configurations=given))
-    assert [record.getMessage() for record in caplog.records] == [
+    assert [record.msg for record in caplog.records] == [
         'launch argument variatn is none of ours: did you mean variant?'
     ]
 

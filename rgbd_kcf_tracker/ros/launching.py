@@ -56,7 +56,8 @@ def given(arguments: Arguments, context: Any) -> dict[str, str]:
     for name in set(context.launch_configurations) - set(arguments):
         near = difflib.get_close_matches(name, arguments, n=1, cutoff=0.85)
         if near:
-            _LOG.warning('launch argument %s is none of ours: did you mean %s?', name, near[0])
+            # launch shows the message as it stands, without arguments put in.
+            _LOG.warning(f'launch argument {name} is none of ours: did you mean {near[0]}?')
     return {name: LaunchConfiguration(name).perform(context) for name in arguments}
 
 
