@@ -230,7 +230,8 @@ def test_bad_values_say_what_to_write(
     assert 'above --start 5' in fails(capsys, *track, '--start', '5', '--end', '5')
     for fps in ('0', '-5', '1e-300', 'inf', 'nan'):
         assert 'fps is' in fails(capsys, *track, '--fps', fps)
-    assert 'tolerance' in fails(capsys, *track, '--tolerance', '-1')
+    for tolerance in ('-1', '1e308'):
+        assert 'give 0 to 3600' in fails(capsys, *track, '--tolerance', tolerance)
     assert list(tmp_path.iterdir()) == []
 
 

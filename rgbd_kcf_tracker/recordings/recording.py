@@ -62,7 +62,7 @@ class ReadOptions:
                 f'fps is {self.fps:g}: it must be between {MIN_FPS:g} and {MAX_FPS:g}'
             )
         if self.tolerance_s is not None and not 0 <= self.tolerance_s <= 3600:
-            raise ParameterError(f'tolerance is {self.tolerance_s:g} s: it must be 0 or more')
+            raise ParameterError(f'tolerance is {self.tolerance_s:g} s: give 0 to 3600')
         if self.rectified not in RECTIFIED:
             raise ParameterError(
                 f'rectified is {self.rectified!r}: choose one of {", ".join(RECTIFIED)}'
