@@ -513,6 +513,22 @@ def test_options_that_change_the_data_stand_in_the_report(scenes: Path, tmp_path
     assert options in (report / 'index.html').read_text()
 
 
+@pytest.mark.parametrize(
+    ('option', 'value', 'words'),
+    [
+        ('--sequences', 'walk_1,wlak_2', "none has 'wlak_2' in its name"),
+        ('--size', '320x180', '--size means nothing without simulated scenes'),
+        ('--seeds', '1-3', '--seeds means nothing without simulated scenes'),
+    ],
+)
+def test_options_that_choose_nothing(
+    option: str, value: str, words: str, scenes: Path, tmp_path: Path, capsys
+):
+    report = str(tmp_path / 'report')
+    assert main(['evaluate', str(scenes), option, value, '--report', report]) == 2
+    assert words in capsys.readouterr().err
+
+
 def test_a_report_folder_that_cannot_be_written(scenes: Path, tmp_path: Path, capsys):
     (tmp_path / 'file').write_text('')
     words = ['evaluate', str(scenes), '--variants', 'kcf', '--report', str(tmp_path / 'file')]

@@ -125,10 +125,26 @@ def run_options(
     )
 
 
-def distinct(sequences: list[Benchmark]) -> list[Benchmark]:
-    """Refuse two sequences of one name: their results would lie in one file."""
+_OF_SCENES = {'seeds': '1', 'scenarios': None, 'duration': None, 'size': '960x540'}
+"""Options of simulated scenes, and what they are where not given."""
+
+
+def checked(args: argparse.Namespace, sequences: list[Benchmark]) -> list[Benchmark]:
+    """Sequences as they can be measured.
+
+    Raises:
+        ParameterError: where two have one name, for their results would lie in one file, or where
+            an option of :func:`add_data_options` chooses nothing.
+    """
     from rgbd_kcf_tracker.evaluation.store import slug
 
+    for name in words(args.sequences or ''):
+        if not any(name in sequence.name for sequence in sequences):
+            raise ParameterError(f'--sequences: none has {name!r} in its name')
+    if all(sequence.path is not None for sequence in sequences):
+        for option, usual in _OF_SCENES.items():
+            if getattr(args, option) != usual:
+                raise ParameterError(f'--{option} means nothing without simulated scenes')
     seen: dict[str, Benchmark] = {}
     for sequence in sequences:
         other = seen.setdefault(slug(sequence.name), sequence)

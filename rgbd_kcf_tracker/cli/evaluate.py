@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 from rgbd_kcf_tracker.cli.benchmarks import (
     add_data_options,
     check_report,
+    checked,
     data_options,
-    distinct,
     end,
     in_words,
     report_folder,
@@ -142,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     read = data_options(args, everyone=args.everyone or args.identity)
-    sequences = distinct([s for text in args.dataset for s in open_dataset(text, read)])
+    sequences = checked(args, [s for text in args.dataset for s in open_dataset(text, read)])
     options = run_options(args, args.short_term, args.fresh)
     shard = shard_of(args)
     own = sequences if shard is None else shard.of(sequences)
@@ -206,7 +206,7 @@ def _identity(args: argparse.Namespace) -> int:
     options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'fresh', *WORKER_OPTIONS)
     refuse(args, 'with --identity', (*options, 'short_term', 'eao_lengths', 'export'))
     read = data_options(args, everyone=args.everyone or args.identity)
-    sequences = distinct([s for text in args.dataset for s in open_dataset(text, read)])
+    sequences = checked(args, [s for text in args.dataset for s in open_dataset(text, read)])
     with report_folder(args.report):
         return _compare(args, sequences)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from rgbd_kcf_tracker.cli.benchmarks import (
     add_data_options,
     check_report,
+    checked,
     data_options,
-    distinct,
     end,
     in_words,
     report_folder,
@@ -170,7 +170,7 @@ def _split(args: argparse.Namespace) -> tuple[list[Benchmark], list[Benchmark]]:
     options = data_options(args)
     sequences = [s for text in args.dataset for s in open_dataset(text, options)]
     if _is_share(args.held_out):
-        return sweep.split(distinct(sequences), float(args.held_out), args.seed)
+        return sweep.split(checked(args, sequences), float(args.held_out), args.seed)
     held = open_dataset(args.held_out, options)
     both = {s.name for s in sequences} & {s.name for s in held}
     if both:
@@ -178,7 +178,7 @@ def _split(args: argparse.Namespace) -> tuple[list[Benchmark], list[Benchmark]]:
             f'--held-out {args.held_out}: {sorted(both)[0]} is among the data, too: what is '
             'held out must not be chosen on'
         )
-    distinct([*sequences, *held])
+    checked(args, [*sequences, *held])
     return sequences, held
 
 
