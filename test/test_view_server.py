@@ -344,6 +344,25 @@ def test_a_form_that_never_ends_holds_no_connection(
     assert b' 408 ' in answer_to(server, FORM + kind + b'token=')
 
 
+def test_the_end_waits_for_no_browser_that_sleeps(server: Server) -> None:
+    """As one that was let go for being too slow: it does not answer that, either."""
+    host, _, port = server.url.split('/')[2].partition(':')
+    words = (
+        f'GET /socket HTTP/1.1\r\nHost: {host}:{port}\r\nOrigin: {origin(server)}\r\n'
+        'Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n'
+        'Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n'
+    )
+    with socket.create_connection((host, int(port)), 20) as asleep:
+        asleep.sendall(words.encode())
+        assert b' 101 ' in asleep.recv(4096)
+        asleep.sendall(b'\x82\x81\0\0\0\0x')  # binary: it is let go
+        while b'only text' not in asleep.recv(4096):
+            pass
+        begun = time.monotonic()
+        server.stop()
+        assert time.monotonic() - begun < 8  # not the ten seconds that aiohttp would wait
+
+
 def test_the_same_trouble_is_told_once(server: Server, caplog: pytest.LogCaptureFixture) -> None:
     """asyncio has much to say where there are more connections than files may be open."""
     told = threading.Event()

@@ -43,6 +43,8 @@ COMMANDS_S = 60
 """Requests that one browser may make each second; beyond, its socket is closed."""
 ACK_S = 10.0
 """Longest wait for a browser to have drawn a moment; one that sleeps longer is let go."""
+CLOSE_S = 1.0
+"""Longest wait at the end for browsers to close their sockets: those that sleep never do."""
 COMPLAINT_S = 60.0
 """Between two words about the same trouble in the log."""
 COOKIE = 'rgbd_kcf_view'
@@ -120,7 +122,7 @@ class Server:
         self._session = secrets.token_urlsafe(32)
         self._loop = asyncio.new_event_loop()
         self._thread: threading.Thread | None = None
-        self._sockets: set[web.WebSocketResponse] = set()
+        self._sockets: dict[web.WebSocketResponse, asyncio.Transport | None] = {}
         self._wrong = asyncio.Lock()
         self.url = ''
 
@@ -184,9 +186,12 @@ class Server:
         await web.SockSite(self._runner, listening).start()
 
     async def _close(self) -> None:
-        for connected in list(self._sockets):
-            with contextlib.suppress(Exception):
-                await asyncio.wait_for(connected.close(), 1)
+        closing = asyncio.gather(*(c.close() for c in self._sockets), return_exceptions=True)
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(closing, CLOSE_S)
+        for transport in self._sockets.values():  # of those that sleep
+            if transport is not None:
+                transport.abort()
         await self._runner.cleanup()
 
     # -- who may ----------------------------------------------------------------------------------
@@ -275,12 +280,12 @@ class Server:
         connected = web.WebSocketResponse(
             max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False
         )
-        self._sockets.add(connected)
+        self._sockets[connected] = request.transport
         try:
             await connected.prepare(request)
             await self._converse(connected)
         finally:
-            self._sockets.discard(connected)
+            del self._sockets[connected]
         return connected
 
     async def _converse(self, connected: web.WebSocketResponse) -> None:
