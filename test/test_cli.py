@@ -205,6 +205,9 @@ def test_bad_values_say_what_to_write(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     track = ('track', folder)
+    for empty in (('--output', ''), ('--output=',)):  # a variable of the shell that is not set
+        assert 'what follows --output is empty' in fails(capsys, *track, *empty)
+    assert 'what follows info is empty' in fails(capsys, 'info', '')
     assert 'X,Y,W,H' in fails(capsys, *track, '--init', '1,2,3')
     assert 'X,Y,W,H' in fails(capsys, *track, '--init', 'a,b,c,d')
     assert 'has no size' in fails(capsys, *track, '--init', '10,10,0,5')

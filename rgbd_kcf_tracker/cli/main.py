@@ -62,6 +62,7 @@ def _run(arguments: list[str]) -> int:
     try:
         with interrupts.handled():
             _prepare_messages()
+            _refuse_empty(arguments)
             arguments = _joined(arguments)
             args = _parser(arguments).parse_args(arguments)
             code = int(args.run(args))
@@ -130,6 +131,18 @@ def _prepare_messages() -> None:
         sys.stdout.reconfigure(errors='surrogateescape' if utf_8 else 'backslashreplace')
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(logging.Formatter('warning: %(message)s'))
+
+
+def _refuse_empty(arguments: list[str]) -> None:
+    """As of a variable of the shell that is not set: it would be the current folder, or nothing."""
+    from rgbd_kcf_tracker.errors import ParameterError
+
+    for before, word in zip([PROGRAM, *arguments], arguments, strict=False):
+        of_word = word.startswith('--') and word.find('=') == len(word) - 1
+        if not word or of_word:
+            raise ParameterError(
+                f'what follows {word[:-1] or before} is empty: give a value, or leave it out'
+            )
 
 
 def _joined(arguments: list[str]) -> list[str]:
