@@ -150,13 +150,20 @@ def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
     # One view leaves another side open, and the best of many is more alike whosever they are.
     assert look_log_odds(0.0, 1.0, 1) > SUREST_OTHER
     assert look_log_odds(0.8, 1.0, 14) < look_log_odds(0.8, 1.0, 1)
-    assert abs(look_log_odds(0.9, 0.05)) < abs(look_log_odds(0.9, 0.5))
+    # A head and shoulders speak for somebody as all of him does, but less against him: they are
+    # mixed with what hides the rest. Of what fits in the hands little shows either way.
+    assert look_log_odds(0.7, 0.1) == look_log_odds(0.7, 0.5) > look_log_odds(0.7, 0.01) > 0
+    assert look_log_odds(0.3, 0.5) < look_log_odds(0.3, 0.1) < look_log_odds(0.3, 0.01) < 0
 
 
 def test_height_speaks_for_the_same_and_against_another():
     assert height_log_odds(None, 1.7) == height_log_odds(1.7, None) == 0.0
     assert height_log_odds(1.72, 1.72) > height_log_odds(1.72, 1.75) > 0
-    assert height_log_odds(1.55, 1.85) < -0.5
+    assert height_log_odds(1.55, 1.85) < -0.3
+    # Most people are about as tall, so that it says little for somebody.
+    people = np.random.default_rng(0).normal(1.7, 0.1, (2, 20_000))
+    odds = [height_log_odds(float(a), float(b)) for a, b in people.T]
+    assert float(np.mean(np.exp(odds))) == pytest.approx(1.0, abs=0.1)
     # Somebody may sit down, so that no height alone can refuse him.
     assert height_log_odds(1.1, 1.85) > -4
 

@@ -46,24 +46,29 @@ LEAST_PIXELS = 30
 """Pixels left of a silhouette without its rim, where colours are mixed with the background's: of
 fewer the rim is taken, too, as they would hardly fill the colours that are told apart."""
 
-STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.61, 0.03
+STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.62, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
 SUREST_SAME, SUREST_OTHER = 3.0, -4.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
-ONE_SIDE, ALL_SIDES = 0.4, 4
+ONE_SIDE, ALL_SIDES = 0.7, 4
 """Share of :data:`SUREST_OTHER` that a single view can say, for there is another side to everybody;
 and the further views from which all sides are known."""
-WHOLE_AREA = 0.3
-"""Square metres of a view in which all of somebody shows; less of it tells less."""
+WHOLE_AREA, TELLING_AREA, PART = 0.3, 0.1, 0.4
+"""Square metres of a view in which all of somebody shows, and from which he is told by what shows
+of him as well as by all (docs/metric.md): a head and shoulders; and the share of that which the
+least part says. Against somebody only all of him says all: what is seen past something has some of
+its colours, and slices that are counted from there."""
 HEIGHT_SIGMA = 0.07
 """Metres by which the height of one person's head differs between two sightings: gait, hair, and a
 floor that is a little out of true."""
-ANY_HEIGHT = 1.5
-"""Share of all people's heads in each metre of height, about the same from 1.4 to 2 m."""
-STOOPED = 0.5
-"""Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden."""
+ANY_HEIGHT = 2.8
+"""Share of all people's heads in each metre of height, where somebody's is: of heights with a
+standard deviation of 10 cm, as of adults, the mean over them, ``1 / (2 * sqrt(pi) * 0.1)``."""
+STOOPED = 0.7
+"""Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
+1 Hz heights of real people hardly tell who it is at all (docs/metric.md)."""
 
 _FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(TINTS) - TINTS // 2] * 2, indexing='ij'))
 _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
@@ -244,10 +249,11 @@ def look_log_odds(alike: float, area: float, views: int = 1) -> float:
             whichever is less.
         views: how many views of his it was compared with.
     """
-    raw = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * math.log2(views))
-    share = 0.4 + 0.6 * min(1.0, area / WHOLE_AREA)
+    odds = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * math.log2(views))
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
-    return min(max(raw, least), SUREST_SAME) * share
+    enough = TELLING_AREA if odds > 0 else WHOLE_AREA
+    share = PART + (1 - PART) * min(1.0, area / enough)
+    return min(max(odds, least), SUREST_SAME) * share
 
 
 def height_log_odds(top: float | None, known: float | None) -> float:
