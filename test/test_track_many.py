@@ -104,6 +104,19 @@ def test_one_that_fails_is_a_row_and_ends_no_other(recordings: Path, tmp_path: P
     assert 'broken: ' in capsys.readouterr().err
 
 
+def test_a_name_too_long_for_the_files_beside_is_told_as_any_error(
+    recordings: Path, tmp_path: Path, capsys
+):
+    long = tmp_path / ('n' * 250)
+    shutil.copytree(recordings / 'normal_0', long)
+    words = ['track', str(long), str(recordings / 'normal_1'), *WORDS]
+    assert main([*words, '--output', str(tmp_path / 'out')]) == 1
+    told = capsys.readouterr().err
+    assert 'File name too long' in told
+    assert 'OSError' not in told
+    assert 'Errno' not in told
+
+
 def test_what_is_done_is_not_done_again_elsewhere_either(
     recordings: Path, tracked: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

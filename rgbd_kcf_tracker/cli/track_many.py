@@ -376,6 +376,8 @@ def _keep(folder: Path, job: TrackJob, result: dict[str, Any]) -> None:
 def _reason(error: Exception | None) -> str:
     if isinstance(error, RgbdKcfError):
         return str(error)
+    if isinstance(error, OSError) and error.strerror:
+        return f'{error.filename}: {error.strerror}' if error.filename else error.strerror
     return f'{type(error).__name__}: {error}'
 
 
