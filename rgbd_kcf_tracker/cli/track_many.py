@@ -376,8 +376,10 @@ def _keep(folder: Path, job: TrackJob, result: dict[str, Any]) -> None:
 def _reason(error: Exception | None) -> str:
     if isinstance(error, RgbdKcfError):
         return str(error)
-    if isinstance(error, OSError) and error.strerror:
-        return f'{error.filename}: {error.strerror}' if error.filename else error.strerror
+    if isinstance(error, OSError):
+        from rgbd_kcf_tracker.recordings.files import why
+
+        return f'{error.filename}: {why(error)}' if error.filename else why(error)
     return f'{type(error).__name__}: {error}'
 
 

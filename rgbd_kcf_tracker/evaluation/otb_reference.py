@@ -44,7 +44,7 @@ class Comparison:
 
 
 def boxes_of(folder: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """FloatArray of our ``kcf``, published and true, ``(n, 4)`` each, in 0-based pixels.
+    """Boxes of our ``kcf``, published and true, ``(n, 4)`` each, in 0-based pixels.
 
     Raises:
         DatasetError: where the folder is not as the module's docstring says.

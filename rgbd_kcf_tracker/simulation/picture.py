@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.geometry import Box, Intrinsics, mask_box
 from rgbd_kcf_tracker.simulation.room import draw_face
-from rgbd_kcf_tracker.simulation.solids import Floats, Layer, Lighting, Vector, render
+from rgbd_kcf_tracker.simulation.solids import Layer, Lighting, Vector, render
 from rgbd_kcf_tracker.simulation.world import Actor, Viewpoint, World
 
 TARGET = 255

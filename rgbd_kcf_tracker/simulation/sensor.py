@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.simulation.solids import Floats
 
 DEPTH_FOCAL = 365.0
 BASELINE = 0.052

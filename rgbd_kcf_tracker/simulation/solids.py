@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.simulation.textures import Texture
 
-Floats = npt.NDArray[np.float32]
 Vector = npt.NDArray[np.float64]
 NEAR = 0.15  # metres: nothing nearer is drawn
 

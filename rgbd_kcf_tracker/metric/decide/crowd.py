@@ -391,7 +391,7 @@ class Crowd:
                 person.chosen = True
                 self._welcome_beside(account, person, beside)
                 return person
-        for person in account.people:
+        for person in account.people:  # what was chosen in this frame and is no figure, once more
             last = person.last if person.seen_at == account.time else None
             if last is not None and last.same(seen):
                 person.chosen = True

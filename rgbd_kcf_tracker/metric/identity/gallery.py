@@ -20,13 +20,11 @@ from statistics import median
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-
-Floats = npt.NDArray[np.float32]
 
 SLICES, SLICE = 9, 0.2
 """Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
