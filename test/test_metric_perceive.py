@@ -389,7 +389,7 @@ def test_a_cut_to_something_else_is_said_to_be_lost():
 
 
 def test_poses_that_are_given_are_taken_before_what_seems():
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     reader.read(picture([], 0.0, pose=STILL), 0.0)
     # In the fixed frame the camera went 0.2 m ahead: what it saw comes 0.2 m nearer.
     ahead = Pose(np.eye(3), np.array([0.0, 0.0, 0.2]))
@@ -400,7 +400,7 @@ def test_poses_that_are_given_are_taken_before_what_seems():
 
 
 def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     reader.read(picture([], 0.0, pose=STILL), 0.0)
     motions = []
     for i in range(1, 9):
@@ -432,7 +432,7 @@ def test_a_camera_whose_poses_stand_still_stands_still_and_creeping_adds_up():
 def test_what_lasts_is_learned_ten_times_a_second_where_frames_come_fast(
     rate: int, room: list[int], looks: list[int], monkeypatch: pytest.MonkeyPatch
 ):
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     learned, since = [], {}
     update = reader.room.update
 
@@ -453,7 +453,7 @@ def test_what_lasts_is_learned_ten_times_a_second_where_frames_come_fast(
 
 
 def test_a_camera_that_moves_learns_from_every_frame():
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     since = []
     for i in range(6):
         pose = Pose(np.eye(3), np.array([0.0, 0.0, 0.05 * i]))
@@ -529,7 +529,7 @@ def test_whoever_is_tall_and_has_a_neck_is_a_person(
 def test_two_people_who_touch_in_the_first_frame_are_not_the_room_and_two_chairs_are(
     high: int, people: bool
 ):
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     pair = [Someone(-0.205, 3.0), Someone(0.205, 3.0)]
     color, depth = images(pair)
     if high:  # nothing but heads and shoulders, on the floor
@@ -541,7 +541,7 @@ def test_two_people_who_touch_in_the_first_frame_are_not_the_room_and_two_chairs
 
 
 def test_a_person_who_stands_in_the_first_frame_is_not_the_room():
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     one = Someone(0.0, 3.0)
     scene = reader.read(picture([one], 0.0), 0.0)
     assert scene is not None
@@ -549,7 +549,7 @@ def test_a_person_who_stands_in_the_first_frame_is_not_the_room():
     assert scene.before[middle]
     depth = wall()
     depth[40:100, 20:80] = 3.0
-    thing = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(texture(0), depth, 0, CAMERA), 0.0)
+    thing = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(texture(0), depth, 0, CAMERA), 0.0)
     assert thing is not None
     assert not thing.before.any()
 
@@ -559,7 +559,7 @@ def test_a_person_who_stands_in_the_first_frame_is_not_the_room():
 
 def scene_of(people: list[Someone], change=lambda depth: depth) -> Scene:
     """The scene of people who came into a room that is known."""
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     for i in range(4):
         reader.read(picture([], 0.1 * i), 0.1)
     color, depth = images(people)
@@ -620,7 +620,7 @@ def test_who_stands_half_behind_another_is_not_joined_with_him():
 
 def test_somebody_who_waves_is_one():
     one = Someone(0.0, 3.0)
-    reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
     for i in range(6):
         color, depth = images([one] if i > 4 else [])
         if i > 4:

@@ -87,9 +87,7 @@ class MetricParameters(Parameters):
     particles: int = parameter(
         256, 'Number of particles while the target is hidden.', minimum=16, maximum=10000
     )
-    seed: int = parameter(
-        1, 'Seed of the particles and of the search for the floor.', minimum=0, maximum=2**31 - 1
-    )
+    seed: int = parameter(1, 'Seed of the particles.', minimum=0, maximum=2**31 - 1)
     use_particles: bool = parameter(
         True, 'Carry particles while hidden, else the motion filter alone.'
     )

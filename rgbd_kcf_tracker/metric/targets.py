@@ -64,7 +64,7 @@ class MetricTargets:
         self._cues = cues
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
-        self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin, p.seed)
+        self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin)
         self._crowd = Crowd()
         self._followers: dict[int, Follower] = {}
         self._waiting: list[int] = []

@@ -72,7 +72,7 @@ def surface_at(frame: Frame, u: float, v: float) -> Box:
     depth = float(view.depth[row, column])
     near = np.abs(view.depth - np.float32(depth)) < BAND_M + BAND_SHARE * depth
     near &= view.depth > 0
-    floor = FloorFinder(0).update(view)
+    floor = FloorFinder().update(view)
     elevation = None if floor is None else floor.elevation(view.depth)
     upright = standing(view, elevation, FLOOR_MARGIN_M)
     if upright[row, column]:

@@ -109,17 +109,14 @@ class SceneReader:
         jump: metres of a depth step between two surfaces at no distance.
         jump_per_metre: by how much that grows with each metre.
         floor_margin: metres above the floor up to which a pixel is floor; 0 leaves the floor in.
-        seed: of the search for the floor.
     """
 
-    def __init__(
-        self, width: int, jump: float, jump_per_metre: float, floor_margin: float, seed: int
-    ) -> None:
+    def __init__(self, width: int, jump: float, jump_per_metre: float, floor_margin: float) -> None:
         self._width = width
         self._jump = jump
         self._jump_per_metre = jump_per_metre
         self._floor_margin = floor_margin
-        self._floors = FloorFinder(seed)
+        self._floors = FloorFinder()
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
         self._light = Light()
