@@ -378,6 +378,19 @@ def test_a_change_of_light_is_no_motion():
     )
 
 
+@pytest.mark.parametrize('seed', range(8))
+def test_who_steps_before_a_camera_and_changes_its_exposure_does_not_move_it(seed: int):
+    rng = np.random.default_rng(seed)
+    ego = EgoMotion()
+    image, view = seen_by(STILL)
+    ego.update(image, view, NOBODY)
+    covered = image.copy()
+    left = rng.integers(0, COLS // 2)
+    covered[:, left : left + COLS // 3] = texture(20 + seed)[:, : COLS // 3]
+    covered = np.clip(covered * 1.15 + rng.normal(0, 4, covered.shape), 0, 255).astype(np.uint8)
+    assert not isinstance(ego.update(covered, view, NOBODY), Pose)
+
+
 def test_a_cut_to_something_else_is_said_to_be_lost():
     ego = EgoMotion()
     image, view = seen_by(STILL)

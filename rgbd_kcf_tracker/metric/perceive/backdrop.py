@@ -308,7 +308,7 @@ class Backdrop:
         if not changed(self._gray, gray, outside):
             return False
         corners = corners_between(self._gray, gray, outside)
-        return corners is None or not stands(*corners)
+        return corners is None or not stands(self._gray, gray, *corners)
 
     def _follow_light(self, image: Image) -> None:
         """Light that changes changes all alike: the median pixel is what it was."""

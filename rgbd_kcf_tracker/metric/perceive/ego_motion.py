@@ -128,8 +128,27 @@ def corners_between(
     return corners[good], found[good]
 
 
-def stands(first: Points, second: Points) -> bool:
-    """Whether the camera stands still, by where its corners ``(n, 2)`` were and are."""
+def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> bool:
+    """Whether the camera stands still, by where corners are in two pictures.
+
+    A camera that sets its exposure anew, as somebody steps before it, moves every corner by a part
+    of a pixel: they are followed once more in the light of the first picture.
+
+    Args:
+        last: ``(h, w)`` uint8, the picture before.
+        gray: that of now.
+        first: ``(n, 2)`` the corners in that before.
+        second: ``(n, 2)`` where they are now.
+    """
+    if _still(first, second):
+        return True
+    few = np.s_[::4, ::4]
+    gain = float(np.median(last[few] / np.maximum(gray[few], 1.0)))
+    found, good = followed(last, cv2.convertScaleAbs(gray, alpha=gain), first.astype(np.float32))
+    return _still(first[good], found[good])
+
+
+def _still(first: Points, second: Points) -> bool:
     still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
     return bool(still >= max(LEAST_CORNERS, LEAST_STILL * len(first)))
 
@@ -147,7 +166,7 @@ def _told(
     if corners is None or len(corners[0]) < LEAST_CORNERS:
         return Lost()
     first, second = (points.astype(np.float64) for points in corners)
-    if stands(first, second):
+    if stands(last, gray, first, second):
         return None
     k = last_view.intrinsics
     z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
