@@ -559,11 +559,11 @@ def test_who_came_back_is_less_likely_the_target_beside_another_who_is_as_like_i
 class Watched:
     """A crowd before a camera that has seen the empty room."""
 
-    def __init__(self) -> None:
+    def __init__(self, frames: int = 6) -> None:
         self.crowd = Crowd()
         self.time = 0.0
-        self._reader = SceneReader(COLS, 0.04, 0.03, 0.0, 0)
-        for _ in range(6):
+        self._reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+        for _ in range(frames):
             self.see()
 
     def see(self, *people: Someone, dt: float = 0.1, targets=None, unsure=()) -> Account:
@@ -633,6 +633,14 @@ def test_an_identity_is_kept_from_frame_to_frame_and_after_an_absence():
     watched.wait(20)
     back = watched.walk(1.0, -0.5, 2.5, RED)
     assert back is first
+
+
+def test_who_walks_before_the_room_is_known_is_none_of_what_stands_still():
+    watched = Watched(frames=0)
+    for x in (-1.0, 0.0):
+        account = watched.see(Someone(x, 3.0, RED), dt=1.0)
+    assert not account.settled
+    assert who(account, 0).mobile
 
 
 def test_a_stranger_is_not_taken_for_who_has_left():
@@ -999,7 +1007,7 @@ def test_what_shows_behind_a_target_that_touches_a_door_frame_is_not_the_target(
     color, depth = images([one])
     x0, x1 = round(one.box.x), round(one.box.right)
     depth[:, :x0] = depth[:, x1:] = one.z + 0.05  # all but the door
-    scene = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
     seen = BySurface.surface_of(Crowd().explain(scene, 0.0), one.box)
     assert seen is None or seen.depth == pytest.approx(one.z, abs=0.1)
 
@@ -1009,7 +1017,7 @@ def test_a_target_that_shows_in_a_gap_between_two_who_are_nearer_is_not_they():
     box = Box(100, 45, 40, 70)
     strip = depth[45:115, 106:134]
     strip[(strip > 3.5) | (np.random.default_rng(1).random(strip.shape) > 0.3)] = np.nan
-    scene = SceneReader(COLS, 0.04, 0.03, 0.0, 0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
     seen = BySurface.surface_of(Crowd().explain(scene, 0.0), box)
     assert seen is not None
     assert seen.depth == pytest.approx(3.5, abs=0.1)

@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     Looks,
     View,
 )
-from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures, place_of
@@ -690,7 +690,9 @@ class Crowd:
             return
         person.area = max(person.area, seen.area)
         # What is small lies as near to the room as the room's depth is uncertain.
-        if account.settled and not person.mobile and seen.area > WHOLE:
+        # Before the room is known anything may seem to stand before it, but not walk.
+        known = account.settled or person.travelled > TRAVELLED
+        if known and not person.mobile and seen.area > WHOLE:
             before = account.scene.before[seen.rows, seen.cols][seen.mask]
             person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
         view = account.look(seen)
