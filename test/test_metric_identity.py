@@ -33,7 +33,15 @@ from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
 from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
-from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, REUNION, SMALL, Account, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import (
+    MOST_PEOPLE,
+    NEW_AREA,
+    REUNION,
+    SMALL,
+    Account,
+    Crowd,
+    Sight,
+)
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -567,13 +575,16 @@ class Watched:
             self.see()
 
     def see(self, *people: Someone, dt: float = 0.1, targets=None, unsure=()) -> Account:
-        self.time += dt
-        scene = self._reader.read(picture(list(people), self.time), dt)
-        assert scene is not None
-        account = self.crowd.explain(scene, self.time)
+        account = self.explain(*people, dt=dt)
         self.crowd.learn(account, targets(account) if targets else {}, unsure)
         self._reader.somebody = account.somebody()
         return account
+
+    def explain(self, *people: Someone, dt: float = 0.1) -> Account:
+        self.time += dt
+        scene = self._reader.read(picture(list(people), self.time), dt)
+        assert scene is not None
+        return self.crowd.explain(scene, self.time)
 
     def walk(self, first: float, last: float, z: float, shirt, trousers=BLACK) -> Person:
         """Somebody walks across at 1 m/s; who he is taken for in the end."""
@@ -641,6 +652,33 @@ def test_who_walks_before_the_room_is_known_is_none_of_what_stands_still():
         account = watched.see(Someone(x, 3.0, RED), dt=1.0)
     assert not account.settled
     assert who(account, 0).mobile
+
+
+@pytest.mark.parametrize(
+    ('top', 'beside', 'parted', 'somebody'),
+    [
+        (1.3, False, False, True),
+        (0.9, False, False, False),
+        (2.3, False, False, False),
+        (None, False, False, False),
+        (1.3, True, False, False),
+        (1.3, False, True, False),
+    ],
+)
+def test_little_of_somebody_is_somebody_where_it_reaches_up_to_where_heads_are(
+    top: float | None, beside: bool, parted: bool, somebody: bool
+):
+    """Who sits behind a monitor, of whom no more shows than a head and a shoulder, was nobody."""
+    watched = Watched()
+    people = [Someone(1.93, 3.0, RED)] + ([Someone(1.35, 3.2, BLUE)] if beside else [])
+    account = watched.explain(*people)
+    small = min(range(len(account.sights)), key=lambda n: account.sights[n].figure.seen.area)
+    sight = account.sights[small]
+    assert sight.figure.seen.area < NEW_AREA
+    figure = dataclasses.replace(sight.figure, top=top, parted=parted)
+    account.sights[small] = Sight(figure, sight.view)
+    watched.crowd.learn(account, {})
+    assert (account.owner[small] >= 0) == somebody
 
 
 def test_a_stranger_is_not_taken_for_who_has_left():

@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figur
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
 
 NEW = 0.0
@@ -50,6 +50,10 @@ or something nearer begins there."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new: a head and shoulders, twice the least
 that is a figure, for arms and legs that come apart from somebody are no people."""
+HEAD_LEVEL = 1.1
+"""Metres above the floor where the heads of people who sit begin: what reaches as high, before a
+room that is known and at a distance from everybody else, is somebody new however little of him
+shows beside a monitor or the image's end. On real people 1.0 to 1.3 m are the same."""
 SMALL = 0.1
 """Square metres of a thing up to which it may be part of somebody's figure: what fits in the hands
 or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
@@ -591,7 +595,7 @@ class Crowd:
             if row == HELD:
                 account.owner[column] = -1
             elif row < 0:
-                if sight.figure.seen.area < NEW_AREA:
+                if sight.figure.seen.area < NEW_AREA and not _is_head(account, column):
                     continue
                 account.owner[column] = len(people)
                 newcomer = self.welcome(sight.figure.place, time)
@@ -724,6 +728,16 @@ class Crowd:
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
             person.gallery.learn(view, account.time)
+
+
+def _is_head(account: Account, column: int) -> bool:
+    """Whether a sight that is small reaches up to where heads are, apart from all others."""
+    figure = account.sights[column].figure
+    if figure.top is None or not HEAD_LEVEL < figure.top < TOP[1]:
+        return False
+    others = (s.figure.place for n, s in enumerate(account.sights) if n != column)
+    apart = all(np.hypot(*(figure.place - place)) > BESIDE for place in others)
+    return account.settled and not figure.parted and apart
 
 
 def _beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:
