@@ -7,11 +7,17 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+import cv2
+import numpy as np
+import numpy.typing as npt
+
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
-from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
+from rgbd_kcf_tracker.recordings.mot import MOT_FILE, Sightings, mot_text
+from rgbd_kcf_tracker.recordings.outputs import cannot_write, check_outputs, make_folder
 
 
 def parser_of(command: str, doc: str | None) -> argparse.ArgumentParser:
@@ -71,3 +77,34 @@ def make_copy(out: Path, *parts: str) -> None:
         raise RecordingError(f'{out} is there already: give another --out')
     for part in (out.parent, out, *(out / name for name in parts)):
         make_folder(part)
+
+
+def write_image(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> None:
+    """Write an image of a copy, without loss.
+
+    Raises:
+        RecordingError: where it cannot be written.
+    """
+    try:
+        path.write_bytes(cv2.imencode('.png', image)[1].tobytes())
+    except OSError as error:
+        raise RecordingError(cannot_write(path, error)) from None
+
+
+def write_truth(
+    out: Path, stamps_ns: Sequence[int], people: Sequence[Iterable[Annotation]]
+) -> None:
+    """Write when the frames of a copy were taken, and who is in them.
+
+    Args:
+        out: the copy.
+        stamps_ns: of its frames.
+        people: in each of them.
+    """
+    rows = [
+        (number, person.id, person.box.as_tuple(), float(person.counts))
+        for number, there in enumerate(people)
+        for person in there
+    ]
+    (out / 'timestamps.txt').write_text(''.join(f'{stamp}\n' for stamp in stamps_ns))
+    (out / MOT_FILE).write_text(mot_text(Sightings.of(*zip(*rows, strict=True))))

@@ -17,16 +17,19 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.bench.altered import make_copy, names_of, parser_of, write_copies
+from rgbd_kcf_tracker.bench.altered import (
+    make_copy,
+    names_of,
+    parser_of,
+    write_copies,
+    write_image,
+)
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
 from rgbd_kcf_tracker.recordings.imagefiles import image_files
-from rgbd_kcf_tracker.recordings.outputs import cannot_write
 
 STRONGER, TINTED = 0.15, 0.05
 """Deviation of the logarithm of the light, and of that of blue and of red against green."""
@@ -64,16 +67,9 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
         color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
         noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
         depth = np.where(frame.depth > 0, np.rint(1000 * (frame.depth + noise)), 0)
-        _write(out / colors.name / f'{path.stem}.png', np.clip(color, 0, 255).astype(np.uint8))
-        _write(out / 'depth' / f'{path.stem}.png', np.clip(depth, 0, 65535).astype(np.uint16))
+        write_image(out / colors.name / f'{path.stem}.png', np.clip(color, 0, 255).astype(np.uint8))
+        write_image(out / 'depth' / f'{path.stem}.png', np.clip(depth, 0, 65535).astype(np.uint16))
     return len(frames)
-
-
-def _write(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> None:
-    try:
-        path.write_bytes(cv2.imencode('.png', image)[1].tobytes())
-    except OSError as error:
-        raise RecordingError(cannot_write(path, error)) from None
 
 
 def main(argv: Sequence[str] | None = None) -> int:

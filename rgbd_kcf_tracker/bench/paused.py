@@ -21,11 +21,16 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from rgbd_kcf_tracker.bench.altered import make_copy, names_of, parser_of, write_copies
+from rgbd_kcf_tracker.bench.altered import (
+    make_copy,
+    names_of,
+    parser_of,
+    write_copies,
+    write_truth,
+)
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
-from rgbd_kcf_tracker.recordings.mot import MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS
 
 
@@ -48,7 +53,6 @@ def pause(
     make_copy(out, 'rgb', 'depth')
     stamps: list[int] = []
     late = 0
-    rows: list[tuple[int, int, tuple[float, ...], float]] = []
     for number, index in enumerate(kept):
         for source, part in ((frames.colors[index], 'rgb'), (frames.depths[index], 'depth')):
             assert source is not None
@@ -58,10 +62,7 @@ def pause(
         elif number and index < kept[number - 1]:
             late = stamps[-1] + shift_ns - frames.stamps_ns[index]
         stamps.append(frames.stamps_ns[index] + late)
-        for person in people.get(index, ()):
-            rows.append((number, person.id, person.box.as_tuple(), float(person.counts)))
-    (out / 'timestamps.txt').write_text(''.join(f'{stamp}\n' for stamp in stamps))
-    (out / MOT_FILE).write_text(mot_text(Sightings.of(*zip(*rows, strict=True))))
+    write_truth(out, stamps, [people.get(index, ()) for index in kept])
     for name in (INTRINSICS, CAMERA_INFO):
         beside = frames.colors[0].parent.parent / name
         if beside.is_file():

@@ -1,0 +1,133 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Copies of recordings in a mirror and backwards: the same people, who come and go another way.
+
+    python -m rgbd_kcf_tracker.bench.turned filinha/ --fps 5 --intrinsics FX,FY,CX,CY --out turned/
+
+writes ``turned/mirror_filinha``, ``turned/back_filinha`` and ``turned/mirror_back_filinha``. What a
+tracker owes to how things happened to fall in a recording, in which part of the picture or in which
+order, it has not in these: whoever sat down at the end sits there from the first frame on. With
+``--every 2`` each second frame is left out as well, as by a camera that gives half as many, in a
+copy that begins with the first and one with the second.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rgbd_kcf_tracker.bench.altered import (
+    make_copy,
+    names_of,
+    parser_of,
+    write_copies,
+    write_image,
+    write_truth,
+)
+from rgbd_kcf_tracker.cli.common import parse_intrinsics
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.evaluation.datasets import everyone
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
+from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS
+
+WAYS = {'same': (False, False), 'mirror': (True, False), 'back': (False, True)}
+WAYS['mirror_back'] = True, True
+"""Copies by name: whether in a mirror, and whether backwards. Whether the first is one of its own
+depends on ``--every``."""
+
+
+def turn(
+    frames: ImageFrames, people: everyone.People, kept: Sequence[int], out: Path, mirror: bool
+) -> None:
+    """Write a copy of some frames of a recording.
+
+    Args:
+        frames: all of the recording, each with depth; a lens is left out, as it has no mirror.
+        people: who is in them.
+        kept: indices of the frames that the copy has, forwards or backwards.
+        out: is made.
+        mirror: whether left and right change places.
+
+    Raises:
+        RgbdKcfError: where it is there, or cannot be made.
+    """
+    make_copy(out, 'rgb', 'depth')
+    truth: list[list[Annotation]] = []
+    width = 0
+    for number, index in enumerate(kept, start=1):
+        frame = frames.frame(index)
+        assert frame.depth is not None
+        width = frame.width
+        depth = np.where(frame.depth > 0, np.rint(1000 * frame.depth), 0).clip(0, 65535)
+        side = slice(None, None, -1 if mirror else 1)
+        color = np.ascontiguousarray(frame.color[:, side])
+        write_image(out / 'rgb' / f'{number:06d}.png', color)
+        write_image(out / 'depth' / f'{number:06d}.png', depth[:, side].astype(np.uint16))
+        there = people.get(index, [])
+        truth.append([_mirrored(each, width) for each in there] if mirror else there)
+    first = frames.stamps_ns[kept[0]]
+    write_truth(out, [abs(frames.stamps_ns[index] - first) for index in kept], truth)
+    k = frames.intrinsics
+    if k is not None:
+        values = {'fx': k.fx, 'fy': k.fy, 'cx': width - 1 - k.cx if mirror else k.cx, 'cy': k.cy}
+        (out / INTRINSICS).write_text(json.dumps(values, indent=2) + '\n')
+
+
+def _mirrored(one: Annotation, width: int) -> Annotation:
+    box = one.box
+    turned = Box(width - box.right, box.y, box.width, box.height)
+    return dataclasses.replace(one, box=turned)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the copies; status 2 where one cannot be made."""
+    parser = parser_of('turned', __doc__)
+    parser.add_argument('--fps', type=float, default=30.0, help='of recordings without stamps')
+    parser.add_argument('--every', type=int, default=1, help='frames of which the copies have one')
+    parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help='of recordings without')
+    args = parser.parse_args(argv)
+    if not 0 < args.fps < math.inf or args.every < 1:
+        parser.error('--fps must be a number above 0, and --every 1 or more')
+    try:
+        camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
+    except ParameterError as error:
+        parser.error(str(error))
+    names = names_of(args.folders, parser)
+
+    def copies() -> Iterator[str]:
+        for folder, name in zip(args.folders, names, strict=True):
+            frames, people = everyone.read(folder, args.fps)
+            if not frames.depths or None in frames.depths:
+                raise RecordingError(f'{folder} holds frames without depth: nobody is known there')
+            if frames.intrinsics is None:
+                frames = dataclasses.replace(frames, intrinsics=camera)
+            for way, (mirror, back) in WAYS.items():
+                if way == 'same' and args.every == 1:
+                    continue
+                order = range(len(frames))[:: -1 if back else 1]
+                for phase in range(args.every):
+                    kept = order[phase :: args.every]
+                    if not any(people.get(index) for index in kept):
+                        raise RecordingError(
+                            f'{folder}: of every {args.every} frames nobody is left'
+                        )
+                    out = args.out / (
+                        f'{way}_{name}' if args.every == 1 else f'{way}_{phase}_{name}'
+                    )
+                    turn(frames, people, kept, out, mirror)
+                    yield f'{out}: {len(kept)} pairs'
+
+    return write_copies(args.out, args.folders, copies)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
