@@ -31,7 +31,7 @@ from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
-from rgbd_kcf_tracker.metric.decide import evidence
+from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
 from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import (
     MOST_PEOPLE,
@@ -920,6 +920,23 @@ def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen,
         assert first.since == pytest.approx(9.0)
 
 
+@pytest.mark.parametrize(('apart', 'mixed_up'), [(0.1, True), (0.9, False)])
+def test_two_who_never_came_so_near_that_places_could_mislead_are_not_exchanged(
+    apart: float, mixed_up: bool
+):
+    """Two in dark clothes walked by each other, and one was followed as the other from then on."""
+    views = look(RED, RED), look(GREEN, GREEN)
+    here = [met(n, (n * apart, 3.0), views[n], views[1 - n], n) for n in range(2)]
+    alike = np.stack([similarity(view, Looks.of(views[::-1])) for view in views], axis=1)
+    watch = MixUps()
+    found = []
+    for time in np.arange(10.0, 11.0, 0.1):
+        for one in here:
+            one.person.moved_to(one.place, time - 0.1)
+        found.append(watch.watch(here, alike, time))
+    assert any(found) == mixed_up
+
+
 @pytest.mark.parametrize('lost', [True, False])
 def test_who_comes_where_another_was_lost_is_somebody_new_if_he_looks_otherwise(lost: bool):
     watched = Watched()
@@ -940,7 +957,10 @@ def test_who_comes_where_another_was_lost_is_somebody_new_if_he_looks_otherwise(
         assert taken_for[-1].number != one.number
 
 
-def test_those_who_were_taken_for_one_another_get_their_numbers_back():
+def test_those_who_were_taken_for_one_another_get_their_numbers_back(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    monkeypatch.setattr(mix_ups, '_by_places', lambda *_: 0.0)
     watched = Watched()
     account, columns = watched.beside(RED, GREEN)
     red, green = (who(account, c) for c in columns)

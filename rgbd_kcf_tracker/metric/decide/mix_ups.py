@@ -11,6 +11,7 @@ and by what was known before.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -36,8 +37,8 @@ AFTER = 5.0
 five sightings, twice :data:`SIGHTINGS`. Later on what was learned since speaks for itself."""
 MIXED_UP = 2.0
 """Log-odds (seven to one) from which two were taken for one another, as for a newcomer who is
-somebody known. At 3 one of twins was lost for a sixth of its scene, and everyone's returns fell
-from 86.3 to 84.7 % (docs/metric.md)."""
+somebody known, beyond what their places said against it while they were near. At 3 one of twins was
+lost for a sixth of its scene, and everyone's returns fell from 86.3 to 84.7 % (docs/metric.md)."""
 NONE_OF_THEM = 3.0
 """Log-odds (20 to 1) from which who came back is none of those who are known: another side or
 another light may show of him."""
@@ -83,11 +84,13 @@ class _Doubt:
     Attributes:
         since: seconds, from when on what was learned may be of another.
         last: seconds, when places last said little.
+        against: log-odds against it by the places of then, at the least.
         said: log-odds of it by the looks.
     """
 
     since: float
     last: float
+    against: float = math.inf
     said: Tally = field(default_factory=Tally)
 
 
@@ -150,7 +153,9 @@ class MixUps:
                 numbers = sorted((one.person.number, other.person.number))
                 key = numbers[0], numbers[1]
                 if near[i, j]:
-                    self._meetings.setdefault(key, _Doubt(time - BEFORE, time)).last = time
+                    meeting = self._meetings.setdefault(key, _Doubt(time - BEFORE, time))
+                    meeting.last = time
+                    meeting.against = min(meeting.against, _by_places(one, other, time))
                 doubt = self._meetings.get(key)
                 if doubt is None:
                     continue
@@ -159,10 +164,17 @@ class MixUps:
                     continue
                 odds, shows = crosswise
                 doubt.said.add(odds, self._counts * shows, time)
-                if found is None and doubt.said.odds(SIGHTINGS) > MIXED_UP:
+                if found is None and doubt.said.odds(SIGHTINGS) > MIXED_UP + doubt.against:
                     found = MixUp(one.person, other.person, doubt.since)
                     del self._meetings[key]
         return found
+
+
+def _by_places(one: Followed, other: Followed, time: float) -> float:
+    """Log-odds that each of two is where he was expected rather than where the other was."""
+    places = np.stack((one.place, other.place))
+    here, there = (each.person.place_log_odds(places, time) for each in (one, other))
+    return max(0.0, float(here[0] + there[1] - here[1] - there[0]))
 
 
 def _crosswise(
