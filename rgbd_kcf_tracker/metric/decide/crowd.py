@@ -53,7 +53,8 @@ that is a figure, for arms and legs that come apart from somebody are no people.
 HEAD_LEVEL = 1.1
 """Metres above the floor where the heads of people who sit begin: what reaches as high, before a
 room that is known and at a distance from everybody else, is somebody new however little of him
-shows beside a monitor or the image's end. On real people 1.0 to 1.3 m are the same."""
+shows beside a monitor or the image's end. From 1.0 m on real people are the same, from 1.3 m on
+those who sit are left out."""
 SMALL = 0.1
 """Square metres of a thing up to which it may be part of somebody's figure: what fits in the hands
 or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
