@@ -14,7 +14,7 @@ from people_rig import BLUE, CAMERA, COLS, ROWS, TOP, WALL, Someone, images, pic
 
 from rgbd_kcf_tracker import Box, Frame
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, upper_median
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, stands, upper_median
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room
@@ -376,6 +376,12 @@ def test_a_change_of_light_is_no_motion():
     assert (
         ego.update(np.clip(image.astype(int) + 30, 0, 255).astype(np.uint8), view, NOBODY) is None
     )
+
+
+def test_a_camera_of_which_no_corner_is_found_again_does_not_stand_still():
+    """All corners were lost from one frame to the next, and following none of them was an error."""
+    image, none = texture(0)[..., 0], np.zeros((0, 2), np.float32)
+    assert not stands(image, 255 - image, none, none)
 
 
 @pytest.mark.parametrize('seed', range(8))

@@ -142,6 +142,8 @@ def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> b
     """
     if _still(first, second):
         return True
+    if len(first) < LEAST_CORNERS:
+        return False
     few = np.s_[::4, ::4]
     gain = float(np.median(last[few] / np.maximum(gray[few], 1.0)))
     found, good = followed(last, cv2.convertScaleAbs(gray, alpha=gain), first.astype(np.float32))
