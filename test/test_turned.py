@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
@@ -96,6 +97,14 @@ def test_what_cannot_be_turned_is_said(
     for wrong in (['--fps', '0'], ['--every', '0'], ['--intrinsics', '1,2']):
         with pytest.raises(SystemExit):
             turned.main([str(recording), *wrong, *other])
+    lens = {
+        'width': WIDTH, 'height': 40, 'distortion_model': 'plumb_bob', 'D': [0.1, 0, 0, 0, 0],
+        'K': [50, 0, 20, 0, 50, 19.5, 0, 0, 1],
+    }  # fmt: skip
+    (recording / 'camera_info.json').write_text(json.dumps(lens))
+    assert turned.main([str(recording), *other]) == 2
+    assert 'rectify' in capsys.readouterr().err
+    (recording / 'camera_info.json').unlink()
     (recording / 'depth' / '3.png').unlink()
     assert turned.main([str(recording), *other]) == 2
     assert 'depth' in capsys.readouterr().err

@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.bench.altered import (
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
+from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.imagefiles import image_files
 
 STRONGER, TINTED = 0.15, 0.05
@@ -66,9 +67,8 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
         assert frame.depth is not None
         color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
         noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
-        depth = np.where(frame.depth > 0, np.rint(1000 * (frame.depth + noise)), 0)
         write_image(out / colors.name / f'{path.stem}.png', np.clip(color, 0, 255).astype(np.uint8))
-        write_image(out / 'depth' / f'{path.stem}.png', np.clip(depth, 0, 65535).astype(np.uint16))
+        write_image(out / 'depth' / f'{path.stem}.png', millimetres(frame.depth + noise))
     return len(frames)
 
 

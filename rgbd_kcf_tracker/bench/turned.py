@@ -36,11 +36,16 @@ from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS
 
-WAYS = {'same': (False, False), 'mirror': (True, False), 'back': (False, True)}
-WAYS['mirror_back'] = True, True
+WAYS = {
+    'same': (False, False),
+    'mirror': (True, False),
+    'back': (False, True),
+    'mirror_back': (True, True),
+}
 """Copies by name: whether in a mirror, and whether backwards. Whether the first is one of its own
 depends on ``--every``."""
 
@@ -51,7 +56,7 @@ def turn(
     """Write a copy of some frames of a recording.
 
     Args:
-        frames: all of the recording, each with depth; a lens is left out, as it has no mirror.
+        frames: all of the recording, each with depth, and freed of the lens.
         people: who is in them.
         kept: indices of the frames that the copy has, forwards or backwards.
         out: is made.
@@ -67,11 +72,11 @@ def turn(
         frame = frames.frame(index)
         assert frame.depth is not None
         width = frame.width
-        depth = np.where(frame.depth > 0, np.rint(1000 * frame.depth), 0).clip(0, 65535)
         side = slice(None, None, -1 if mirror else 1)
         color = np.ascontiguousarray(frame.color[:, side])
         write_image(out / 'rgb' / f'{number:06d}.png', color)
-        write_image(out / 'depth' / f'{number:06d}.png', depth[:, side].astype(np.uint16))
+        depth = millimetres(frame.depth[:, side])
+        write_image(out / 'depth' / f'{number:06d}.png', depth)
         there = people.get(index, [])
         truth.append([_mirrored(each, width) for each in there] if mirror else there)
     first = frames.stamps_ns[kept[0]]
@@ -108,6 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             frames, people = everyone.read(folder, args.fps)
             if not frames.depths or None in frames.depths:
                 raise RecordingError(f'{folder} holds frames without depth: nobody is known there')
+            if frames.intrinsics is not None and frames.intrinsics.lens is not None:
+                raise RecordingError(f'{folder} is seen through a lens: rectify its images first')
             if frames.intrinsics is None:
                 frames = dataclasses.replace(frames, intrinsics=camera)
             for way, (mirror, back) in WAYS.items():

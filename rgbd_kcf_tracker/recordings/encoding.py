@@ -154,7 +154,7 @@ def encode_bare_depth(depth: DepthImage, codec: str = 'tiff') -> PackedImage:
     return PackedImage(f'16UC1; {codec} compressed', _imencode(suffix, millimetres(depth), flags))
 
 
-def millimetres(depth: DepthImage) -> npt.NDArray[np.uint16]:
+def millimetres(depth: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint16]:
     """Metres as whole millimetres, 0 for no reading and for what 16 bits cannot hold."""
     scaled = np.rint(depth * np.float32(1000))
     with np.errstate(invalid='ignore'):
