@@ -348,11 +348,35 @@ def test_a_person_stays_in_the_world_while_the_camera_turns():
     one.moved_to(np.array([0.1, 3.0]), 0.1)
     # The camera turns left by 90 degrees: what was ahead is now to the right.
     rotation, _ = cv2.Rodrigues(np.array([0.0, np.pi / 2, 0.0]))
-    one.carried(Pose(rotation, np.zeros(3)), np.array([0.0, 0.0, 1.0]))
+    axes = np.eye(3)[::2]
+    one.carried(Pose(rotation, np.zeros(3)), axes, axes)
     assert one.place == pytest.approx([3.0, -0.1], abs=1e-9)
     assert one.first_place == pytest.approx([3.0, 0.0], abs=1e-9)
     assert np.hypot(*one.velocity) == pytest.approx(1 - np.exp(-0.1 / VELOCITY_TIME))
     assert one.last is None
+
+
+@pytest.mark.parametrize('roll', [0.0, 0.2])
+def test_who_stands_does_not_travel_before_a_camera_that_is_tilted_and_turns(roll: float):
+    """Axes that were not at right angles to each other drew places out with each frame."""
+    down = np.array([np.sin(roll), np.cos(roll) * np.cos(0.4), np.cos(roll) * np.sin(0.4)])
+    ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
+    ahead /= np.linalg.norm(ahead)
+    axes = np.stack((np.cross(down, ahead), ahead))
+    where = np.array([0.4, 0.3, 4.0])  # a point, in the camera's frame
+    one = Person(1, axes @ where, 0.0)
+    for frame in range(1, 40):
+        turn, _ = cv2.Rodrigues(np.array([0.02, 0.06, -0.03]) * np.cos(frame / 3))
+        motion = Pose(turn, np.array([0.02, 0.0, 0.01]) * np.sin(frame / 5))
+        was = axes
+        down, where = turn @ down, motion.of(where[None])[0]
+        ahead = np.array([0.0, 0.0, 1.0]) - down[2] * down
+        ahead /= np.linalg.norm(ahead)
+        axes = np.stack((np.cross(down, ahead), ahead))
+        one.carried(motion, was, axes)
+        assert one.place == pytest.approx(axes @ where, abs=0.01)
+        one.moved_to(axes @ where, 0.1 * frame)
+    assert one.travelled < 0.1
 
 
 def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():

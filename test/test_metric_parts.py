@@ -143,6 +143,27 @@ def test_floor_is_found_and_what_stands_on_it_is_above():
     assert floor.row_at(110, 2.0) == pytest.approx(80 + 200 * 1.2 / 2.0, abs=2)
 
 
+@pytest.mark.parametrize('roll', [0.0, 0.2, -0.35])
+def test_places_on_the_floor_have_axes_at_right_angles_however_the_camera_rolls(roll: float):
+    tilt, height = 0.3, 1.4
+    down = np.array([np.sin(roll), np.cos(roll) * np.cos(tilt), np.cos(roll) * np.sin(tilt)])
+    rows, columns = np.mgrid[:160, :240]
+    rays = np.stack(
+        ((columns - CAMERA.cx) / CAMERA.fx, (rows - CAMERA.cy) / CAMERA.fy, np.ones((160, 240)))
+    )
+    below = np.tensordot(down, rays, 1)
+    depth = np.where(below > 1e-3, height / np.maximum(below, 1e-3), 6.0)
+    floor = FloorFinder().update(view_of(np.minimum(depth, 6.0).astype(np.float32)))
+    assert floor is not None
+    across, ahead = floor.axes(CAMERA)
+    assert np.stack((across, down, ahead)) @ np.stack((across, down, ahead)).T == pytest.approx(
+        np.eye(3), abs=1e-3
+    )
+    assert across[0] > 0
+    assert ahead[2] > 0
+    assert across[2] == pytest.approx(0.0, abs=1e-9), 'to the right of where the camera looks'
+
+
 def desks(rng: np.random.Generator) -> np.ndarray:
     """A room of whose floor furniture, with level tops, leaves gaps: a fifth of the lower part."""
     depth = floor_scene(1.1)

@@ -573,6 +573,26 @@ def test_a_person_who_stands_in_the_first_frame_is_not_the_room():
     assert not thing.before.any()
 
 
+def test_what_a_turning_camera_sees_of_a_part_is_nobody_until_both_its_sides_show():
+    """A strip of a window had a person's shape, and was somebody from then on."""
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+    shown = []
+    for i in range(26):
+        at = 0.1 * i
+        one = Someone(2.4 - at, 2.5)
+        color, depth = images([one])
+        depth[depth == WALL] = np.nan  # nothing that he could stand before
+        pose = Pose(np.eye(3), np.array([at, 0.0, 0.0]))
+        scene = reader.read(Frame(color, depth, round(1e8 * i), CAMERA, pose), 0.1)
+        assert scene is not None
+        left, right = max(int(one.box.x) + 2, 0), min(int(one.box.right) - 2, COLS)
+        if right - left > 4:
+            share = scene.before[int(one.box.y) + 4 : 140, left:right].mean()
+            shown.append((one.box.right < COLS - 2, share > 0.5))
+    assert {whole for whole, _ in shown} == {False, True}
+    assert all(told == whole for whole, told in shown), shown
+
+
 # -- figures --------------------------------------------------------------------------------------
 
 

@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -14,10 +16,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
+from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.encoding import millimetres
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.outputs import cannot_write, check_outputs, make_folder
+from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS
 
 
 def parser_of(command: str, doc: str | None) -> argparse.ArgumentParser:
@@ -89,6 +97,52 @@ def write_image(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16
         path.write_bytes(cv2.imencode('.png', image)[1].tobytes())
     except OSError as error:
         raise RecordingError(cannot_write(path, error)) from None
+
+
+def write_pair(out: Path, number: int, color: Image, depth: Floats) -> None:
+    """Write the colours and the depth of one frame of a copy that has the folders for it.
+
+    Args:
+        out: the copy.
+        number: of the frame, from 1.
+        color: ``(H, W, 3)`` BGR.
+        depth: ``(H, W)`` metres.
+
+    Raises:
+        RecordingError: where they cannot be written.
+    """
+    write_image(out / 'rgb' / f'{number:06d}.png', np.ascontiguousarray(color))
+    write_image(out / 'depth' / f'{number:06d}.png', millimetres(depth))
+
+
+def write_camera(out: Path, camera: Intrinsics | None) -> None:
+    """Write by what camera a copy was taken, where that is known."""
+    if camera is not None:
+        values = {'fx': camera.fx, 'fy': camera.fy, 'cx': camera.cx, 'cy': camera.cy}
+        (out / INTRINSICS).write_text(json.dumps(values, indent=2) + '\n')
+
+
+def read_with_depth(
+    folder: Path, fps: float, camera: Intrinsics | None
+) -> tuple[ImageFrames, everyone.People]:
+    """A recording of which copies are made, and who is in it.
+
+    Args:
+        folder: the recording.
+        fps: frames per second, where it has no stamps.
+        camera: intrinsics, where it has none.
+
+    Raises:
+        RecordingError: where a frame has no depth, or it is seen through a lens.
+    """
+    frames, people = everyone.read(folder, fps)
+    if not frames.depths or None in frames.depths:
+        raise RecordingError(f'{folder} holds frames without depth: nobody is known there')
+    if frames.intrinsics is not None and frames.intrinsics.lens is not None:
+        raise RecordingError(f'{folder} is seen through a lens: rectify its images first')
+    if frames.intrinsics is None:
+        frames = dataclasses.replace(frames, intrinsics=camera)
+    return frames, people
 
 
 def write_truth(

@@ -15,20 +15,19 @@ copy that begins with the first and one with the second.
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from rgbd_kcf_tracker.bench.altered import (
     make_copy,
     names_of,
     parser_of,
+    read_with_depth,
+    write_camera,
     write_copies,
-    write_image,
+    write_pair,
     write_truth,
 )
 from rgbd_kcf_tracker.cli.common import parse_intrinsics
@@ -36,9 +35,7 @@ from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
-from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS
 
 WAYS = {
     'same': (False, False),
@@ -73,18 +70,15 @@ def turn(
         assert frame.depth is not None
         width = frame.width
         side = slice(None, None, -1 if mirror else 1)
-        color = np.ascontiguousarray(frame.color[:, side])
-        write_image(out / 'rgb' / f'{number:06d}.png', color)
-        depth = millimetres(frame.depth[:, side])
-        write_image(out / 'depth' / f'{number:06d}.png', depth)
+        write_pair(out, number, frame.color[:, side], frame.depth[:, side])
         there = people.get(index, [])
         truth.append([_mirrored(each, width) for each in there] if mirror else there)
     first = frames.stamps_ns[kept[0]]
     write_truth(out, [abs(frames.stamps_ns[index] - first) for index in kept], truth)
-    k = frames.intrinsics
-    if k is not None:
-        values = {'fx': k.fx, 'fy': k.fy, 'cx': width - 1 - k.cx if mirror else k.cx, 'cy': k.cy}
-        (out / INTRINSICS).write_text(json.dumps(values, indent=2) + '\n')
+    camera = frames.intrinsics
+    if camera is not None and mirror:
+        camera = dataclasses.replace(camera, cx=width - 1 - camera.cx)
+    write_camera(out, camera)
 
 
 def _mirrored(one: Annotation, width: int) -> Annotation:
@@ -110,13 +104,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def copies() -> Iterator[str]:
         for folder, name in zip(args.folders, names, strict=True):
-            frames, people = everyone.read(folder, args.fps)
-            if not frames.depths or None in frames.depths:
-                raise RecordingError(f'{folder} holds frames without depth: nobody is known there')
-            if frames.intrinsics is not None and frames.intrinsics.lens is not None:
-                raise RecordingError(f'{folder} is seen through a lens: rectify its images first')
-            if frames.intrinsics is None:
-                frames = dataclasses.replace(frames, intrinsics=camera)
+            frames, people = read_with_depth(folder, args.fps, camera)
             for way, (mirror, back) in WAYS.items():
                 if way == 'same' and args.every == 1:
                     continue

@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures, place_of
 from rgbd_kcf_tracker.metric.perceive.parting import APART
-from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
@@ -353,6 +353,7 @@ class Crowd:
         self._next = 1
         self._frames = 0
         self._shape = 0, 0
+        self._axes = CAMERA_AXES
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
         self._known: list[Looks] = []
@@ -443,7 +444,8 @@ class Crowd:
                 person.last = None
         if isinstance(scene.motion, Pose):
             for person in self.people:
-                person.carried(scene.motion, scene.ahead)
+                person.carried(scene.motion, self._axes, scene.axes)
+        self._axes = scene.axes
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]

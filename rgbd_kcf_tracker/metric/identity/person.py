@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
@@ -199,18 +201,21 @@ class Person:
         other.gallery.take(mine)
         self._resembles, other._resembles = {}, {}
 
-    def carried(self, motion: Pose, ahead: FloatArray) -> None:
+    def carried(self, motion: Pose, axes: FloatArray, now: FloatArray) -> None:
         """Keep the place and the velocity in the world while the camera moves.
 
         Args:
             motion: the pose of the last camera's frame in that of now, in metres.
-            ahead: ``(3,)`` unit vector along the floor away from the camera.
+            axes: of places so far, ``(2, 3)``, see :attr:`~.perceive.scene.Scene.axes`.
+            now: those from now on.
         """
-        across = np.array([1.0, 0.0, 0.0])
-        floor = np.stack((across, ahead))
         self.last = None
-        turned = floor @ motion.rotation @ floor.T
-        shift = floor @ motion.translation
+        turned = now @ motion.rotation @ axes.T
+        # The floor of two frames differs by some noise, and no place is to grow by that.
+        turn = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])
+        cos, sin = math.cos(turn), math.sin(turn)
+        turned = np.array([[cos, -sin], [sin, cos]])
+        shift = now @ motion.translation
         self.place = turned @ self.place + shift
         self.first_place = turned @ self.first_place + shift
         self.velocity = turned @ self.velocity

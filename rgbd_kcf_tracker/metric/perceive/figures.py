@@ -89,6 +89,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         parts = parted(
             scene.view,
             scene.forward,
+            scene.axes[0],
             part[1].start + left,
             part[0].start + top,
             member[crop],
@@ -174,6 +175,7 @@ def makes_figure(scene: Scene, seen: Silhouette) -> bool:
 
 def place_of(scene: Scene, seen: Silhouette) -> FloatArray:
     """Where a silhouette is, ``(2,)`` metres across and along the floor."""
-    left, _, right, _ = seen.metres
+    left, top, right, bottom = seen.metres
+    middle = np.array([(left + right) / 2, (top + bottom) / 2, seen.depth])
     ahead = float(scene.forward[seen.rows, seen.cols][seen.mask].mean())
-    return np.array([(left + right) / 2, ahead])
+    return np.array([scene.axes[0] @ middle, ahead])

@@ -91,12 +91,16 @@ class Floor:
         ahead *= np.float32(1 / np.sqrt(1 - self.tilt**2))
         return ahead
 
-    def ahead(self, k: Intrinsics) -> npt.NDArray[np.float64]:
-        """Unit vector along the floor away from the camera, ``(3,)`` in the camera's frame."""
+    def axes(self, k: Intrinsics) -> FloatArray:
+        """Unit vectors along the floor, ``(2, 3)`` in the camera's frame: to the right, and ahead.
+
+        They are at right angles to each other however the camera rolls.
+        """
         down = np.array([self.a * k.fx, self.b * k.fy, self.c + self.a * k.cx + self.b * k.cy])
         down *= self.height
         level = np.array([0.0, 0.0, 1.0]) - down[2] * down
-        return np.asarray(level / np.linalg.norm(level))
+        ahead = level / np.linalg.norm(level)
+        return np.stack((np.cross(down, ahead), ahead))
 
     def row_at(self, u: float, z: float) -> float:
         """Row in which the floor is seen in column ``u`` at depth ``z``."""

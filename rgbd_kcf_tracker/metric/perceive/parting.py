@@ -38,6 +38,7 @@ NOBODY = np.zeros((0, 2))
 def parted(
     view: DepthView,
     forward: npt.NDArray[np.float32],
+    right: FloatArray,
     left: int,
     top: int,
     mask: Mask,
@@ -48,6 +49,7 @@ def parted(
     Args:
         view: the depth.
         forward: ``(h, w)`` metres along the floor.
+        right: ``(3,)`` unit vector along it to the right, in the camera's frame.
         left: column of the mask's corner in the view.
         top: its row.
         mask: ``(rows, cols)`` of somebody, or of several who touch.
@@ -59,9 +61,13 @@ def parted(
     ahead = forward[top : top + rows, left : left + cols]
     z = float(depth[mask].mean())
     columns = np.arange(left, left + cols) + 0.5 - k.cx
+    lines = np.arange(top, top + rows) + 0.5 - k.cy
+    # Where the camera rolls, who stands upright is tilted in the picture.
+    x_of, y_of = right[0] / k.fx, right[1] / k.fy
     seeds = expected
     if len(seeds):
-        u = seeds[:, 0] * k.fx / np.maximum(seeds[:, 1], 0.2) + k.cx - left
+        u = seeds[:, 0] / np.maximum(seeds[:, 1], 0.2) - lines[rows // 2] * y_of
+        u = u / x_of + k.cx - left
         margin = 0.1 * k.fx / z
         inside = (u > -margin) & (u < cols + margin)
         if np.count_nonzero(inside) > 1:
@@ -71,12 +77,13 @@ def parted(
     if len(seeds) < 2:
         if cols * z / k.fx < BROAD:
             return [(left, top, mask)]
-        seeds = _heads(mask, depth, ahead, columns, top - k.cy, k.fx, k.fy)
+        seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
         if len(seeds) < 2:
             return [(left, top, mask)]
     v, u_ = np.nonzero(mask)
     reach = np.array([REACH_ACROSS, REACH_DEEP])
-    points = np.stack((columns[u_] * depth[v, u_] / k.fx, ahead[v, u_]), axis=1) / reach
+    across = (columns[u_] * x_of + lines[v] * y_of) * depth[v, u_]
+    points = np.stack((across, ahead[v, u_]), axis=1) / reach
     seeds = seeds / reach
     some = points[::EVERY]
     for _ in range(3):
@@ -119,7 +126,8 @@ def _heads(
     ahead: npt.NDArray[np.float32],
     columns: npt.NDArray[np.float64],
     above: float,
-    fx: float,
+    x_of: float,
+    y_of: float,
     fy: float,
 ) -> FloatArray:
     """Where the heads in a wide mask are, ``(n, 2)`` metres across and deep."""
@@ -128,8 +136,8 @@ def _heads(
     sums = np.where(mask, depth, 0).sum(axis=0)
     z = np.where(has, sums / np.maximum(mask.sum(axis=0), 1), np.nan)
     tall = -(first + above) * z / fy
-    across = columns * z / fx
-    wide = max(1, int(0.1 * fx / float(np.nanmean(z))))
+    across = (columns * x_of + (first + above) * y_of) * z
+    wide = max(1, int(0.1 / x_of / float(np.nanmean(z))))
     filled = np.where(has, tall, np.nanmin(tall) - 1)
     smooth = np.convolve(np.pad(filled, wide, mode='edge'), np.full(2 * wide + 1, 1.0), 'valid')
     smooth /= 2 * wide + 1

@@ -148,6 +148,7 @@ class Room:
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
         self._unlearned = 0.0
+        self._in_part: Mask = self.before
 
     def restart(self, depth: DepthArray, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -158,6 +159,7 @@ class Room:
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
         self._front = np.where(somebody, depth, np.float32(0))
+        self._in_part = np.zeros(depth.shape, np.bool_)
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
@@ -182,8 +184,10 @@ class Room:
             k: of the view.
 
         Returns:
-            ``(h, w)`` bool, the pixels of which nothing is known any more.
+            ``(h, w)`` bool, the pixels of which nothing is known any more, and those that were
+            taken for room while only a part of what they show was in view.
         """
+        in_part = _seen_from(np.where(self._in_part, self.depth, np.float32(0)), motion, k) > 0
         front = np.where((self.depth == 0) & (self._blind >= BLIND_FRAMES), self._front, 0)
         self.depth = _seen_from(self.depth, motion, k)
         self._front = _seen_from(front.astype(np.float32), motion, k)
@@ -192,8 +196,12 @@ class Room:
         self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._farther = np.zeros_like(self.depth)
         self._still_for = np.zeros_like(self.depth)
-        lost: Mask = unknown & ~opened
+        lost: Mask = (unknown & ~opened) | in_part
         return lost
+
+    def seen_in_part(self, pixels: Mask) -> None:
+        """Remember pixels, ``(h, w)`` bool, of what reaches beyond the end of the view."""
+        self._in_part = pixels
 
     def going_on(self, depth: DepthArray, surfaces: Surfaces) -> Mask:
         """Pixels, ``(h, w)`` bool, of surfaces of which what is known stands before the room.

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -30,6 +31,8 @@ LEARNING_STEP = 0.09
 """Seconds after which what lasts (room, floor, looks, colours) is learned again while the
 camera stands and frames come faster than twice as often: at 30 Hz from every third frame, and at
 20 Hz and less from each."""
+CAMERA_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+"""The axes along which places are told where no floor is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,8 @@ class Scene:
         elevation: ``(h, w)`` float32 metres above the floor, or None likewise.
         forward: ``(h, w)`` float32 metres along the floor, or along the optical axis where no floor
             is known.
+        axes: ``(2, 3)`` unit vectors along the floor in the camera's frame, to the right and ahead;
+            the camera's own where no floor is known.
         standing: ``(h, w)`` bool, pixels with a reading that are not floor.
         before: ``(h, w)`` bool, pixels that show something before the room.
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
@@ -60,6 +65,7 @@ class Scene:
     floor: Floor | None
     elevation: npt.NDArray[np.float32] | None
     forward: npt.NDArray[np.float32]
+    axes: FloatArray
     standing: npt.NDArray[np.bool_]
     before: npt.NDArray[np.bool_]
     still: npt.NDArray[np.bool_]
@@ -70,13 +76,6 @@ class Scene:
     motion: Pose | Lost | None
     since: float | None
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
-
-    @property
-    def ahead(self) -> npt.NDArray[np.float64]:
-        """Unit vector along the floor away from the camera, ``(3,)`` in the camera's frame."""
-        if self.floor is None:
-            return np.array([0.0, 0.0, 1.0])
-        return self.floor.ahead(self.view.intrinsics)
 
     @cached_property
     def sizes(self) -> Sizes:
@@ -147,9 +146,10 @@ class SceneReader:
         teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
         floor = self._floors.update(view, learns) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
-        forward = view.depth
+        forward, axes = view.depth, CAMERA_AXES
         if floor is not None and elevation is not None:
             forward = floor.forward(view.depth, elevation)
+            axes = floor.axes(view.intrinsics)
         mask = standing(view, elevation, self._floor_margin)
         surfaces = surfaces_in(view.depth, mask, self._jump, self._jump_per_metre)
         if self._rim is None:
@@ -163,16 +163,19 @@ class SceneReader:
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
-            people = upright_people(view, surfaces, elevation, forward, self._rim)
+            people = upright_people(view, surfaces, elevation, forward, axes[0], self._rim)
             self.room.restart(view.depth, people)
             self._light.restart()
         else:
             somebody = self.somebody
             if isinstance(motion, Pose):
                 unknown = self.room.moved(motion, view.intrinsics)
-                people = upright_people(view, surfaces, elevation, forward, self._rim)
+                people = upright_people(
+                    view, surfaces, elevation, forward, axes[0], self._rim, whole=True
+                )
                 people |= self.room.going_on(view.depth, surfaces)
                 self.room.open(people & unknown, view.depth)
+                self.room.seen_in_part(unknown & _at_side(surfaces, self._rim) & ~people)
                 self._light.restart()
                 somebody = None
             self.room.update(view.depth, seconds, somebody, surfaces, learns)
@@ -188,6 +191,7 @@ class SceneReader:
             floor,
             elevation,
             forward,
+            axes,
             mask,
             before,
             self.room.still,
@@ -224,6 +228,16 @@ class SceneReader:
             return None
         self._pose = now
         return moved
+
+
+def _at_side(surfaces: Surfaces, rim: Rim) -> Mask:
+    """The pixels, ``(h, w)`` bool, of surfaces that go on to the left or right of the view."""
+    left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
+    columns = surfaces.labels.shape[1]
+    beyond = (left <= 1 + rim.left) | (left + width >= columns - 1 - rim.right)
+    beyond[0] = False
+    mask: Mask = beyond[surfaces.labels]
+    return mask
 
 
 def _stands(moved: Pose) -> bool:

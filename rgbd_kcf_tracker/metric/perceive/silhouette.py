@@ -120,6 +120,11 @@ class Silhouette:
         """True where it reaches the end of what the camera sees."""
         return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view).any
 
+    def at_side(self, view: DepthView, rim: Rim) -> bool:
+        """True where it reaches the end of what the camera sees to the left or to the right."""
+        ends = rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
+        return ends.left or ends.right
+
     def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
 

@@ -130,7 +130,9 @@ def upright_people(
     surfaces: Surfaces,
     elevation: npt.NDArray[np.float32] | None,
     forward: npt.NDArray[np.float32],
+    right: FloatArray,
     rim: Rim,
+    whole: bool = False,
 ) -> npt.NDArray[np.bool_]:
     """The pixels of all surfaces and parts of them that have a person's shape, ``(h, w)`` bool.
 
@@ -139,7 +141,10 @@ def upright_people(
         surfaces: what stands on the floor.
         elevation: ``(h, w)`` metres above the floor, None where none is known.
         forward: ``(h, w)`` metres along the floor.
+        right: ``(3,)`` unit vector along it to the right, in the camera's frame.
         rim: of the view.
+        whole: whether only those count of which both sides show: of a wall or a cupboard any strip
+            may be seen.
     """
     k = view.intrinsics
     z = surfaces.depth.astype(np.float64)
@@ -156,10 +161,10 @@ def upright_people(
         mask = surfaces.labels[upper : upper + height, left : left + width] == label
         found = []
         if one[label]:
-            whole = Silhouette.of(view, left, upper, mask, int(label), rim)
-            found = [whole] if upright(whole, k, whole.highest(elevation)) else []
+            single = Silhouette.of(view, left, upper, mask, int(label), rim)
+            found = [single] if upright(single, k, single.highest(elevation)) else []
         if not found and several[label]:
-            parts = parted(view, forward, left, upper, mask)
+            parts = parted(view, forward, right, left, upper, mask)
             cut = [Silhouette.of(view, *part, 0, rim) for part in parts if len(parts) > 1]
             found = [
                 part
@@ -167,5 +172,7 @@ def upright_people(
                 if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
         for seen in found:
+            if whole and seen.at_side(view, rim):
+                continue
             people[seen.rows, seen.cols] |= seen.mask
     return people
