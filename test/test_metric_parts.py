@@ -40,10 +40,12 @@ from rgbd_kcf_tracker.metric.perceive.colors import (
     view_image,
 )
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
+from rgbd_kcf_tracker.pose import Pose
 
 CAMERA = Intrinsics(200, 200, 120, 80)
 
@@ -143,17 +145,22 @@ def test_floor_is_found_and_what_stands_on_it_is_above():
     assert floor.row_at(110, 2.0) == pytest.approx(80 + 200 * 1.2 / 2.0, abs=2)
 
 
-@pytest.mark.parametrize('roll', [0.0, 0.2, -0.35])
-def test_places_on_the_floor_have_axes_at_right_angles_however_the_camera_rolls(roll: float):
-    tilt, height = 0.3, 1.4
-    down = np.array([np.sin(roll), np.cos(roll) * np.cos(tilt), np.cos(roll) * np.sin(tilt)])
+def tilted_floor(down: np.ndarray, height: float) -> np.ndarray:
+    """A floor ``height`` metres below a camera whose frame ``down`` points down in, and a wall."""
     rows, columns = np.mgrid[:160, :240]
     rays = np.stack(
         ((columns - CAMERA.cx) / CAMERA.fx, (rows - CAMERA.cy) / CAMERA.fy, np.ones((160, 240)))
     )
     below = np.tensordot(down, rays, 1)
     depth = np.where(below > 1e-3, height / np.maximum(below, 1e-3), 6.0)
-    floor = FloorFinder().update(view_of(np.minimum(depth, 6.0).astype(np.float32)))
+    return np.minimum(depth, 6.0).astype(np.float32)
+
+
+@pytest.mark.parametrize('roll', [0.0, 0.2, -0.35])
+def test_places_on_the_floor_have_axes_at_right_angles_however_the_camera_rolls(roll: float):
+    tilt, height = 0.3, 1.4
+    down = np.array([np.sin(roll), np.cos(roll) * np.cos(tilt), np.cos(roll) * np.sin(tilt)])
+    floor = FloorFinder().update(view_of(tilted_floor(down, height)))
     assert floor is not None
     across, ahead = floor.axes(CAMERA)
     assert np.stack((across, down, ahead)) @ np.stack((across, down, ahead)).T == pytest.approx(
@@ -162,6 +169,34 @@ def test_places_on_the_floor_have_axes_at_right_angles_however_the_camera_rolls(
     assert across[0] > 0
     assert ahead[2] > 0
     assert across[2] == pytest.approx(0.0, abs=1e-9), 'to the right of where the camera looks'
+
+
+def test_a_floor_of_which_hardly_any_shows_is_where_it_was_however_the_camera_moves():
+    """It was none, and somebody who came near was one surface with all around him."""
+    down = np.array([0.0, np.cos(0.3), np.sin(0.3)])
+    turn, _ = cv2.Rodrigues(np.array([0.05, -0.2, 0.1]))
+    motion = Pose(turn, np.array([0.1, -0.2, 0.3]))
+    finder = FloorFinder()
+    assert finder.update(view_of(tilted_floor(down, 1.4))) is not None
+    near = np.full((160, 240), 0.8, np.float32)
+    floor = finder.update(view_of(near), motion=motion)
+    assert floor is not None
+    after = turn @ down
+    height = 1.4 + after @ motion.translation
+    assert floor.height == pytest.approx(height, abs=0.01)
+    assert floor.height * floor.plane(CAMERA) == pytest.approx(after, abs=0.01)
+    assert finder.update(view_of(np.zeros((160, 240), np.float32))) is floor
+    again = finder.update(view_of(tilted_floor(after, height)))
+    assert again is not None
+    assert again.height == pytest.approx(height, abs=0.005)
+
+
+def test_a_floor_below_which_something_lies_or_that_is_lost_is_none():
+    down = np.array([0.0, 1.0, 0.0])
+    for motion, nearer in ((Lost(), 0.8), (None, 5.0)):
+        finder = FloorFinder()
+        assert finder.update(view_of(tilted_floor(down, 1.4))) is not None
+        assert finder.update(view_of(wall(nearer)), motion=motion) is None
 
 
 def desks(rng: np.random.Generator) -> np.ndarray:

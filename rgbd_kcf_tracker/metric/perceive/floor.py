@@ -18,6 +18,8 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
+from rgbd_kcf_tracker.pose import Pose
 
 MIN_UPRIGHT = 0.75
 """Cosine of the largest tilt between the camera's down axis and the floor's normal: 41 degrees,
@@ -91,13 +93,34 @@ class Floor:
         ahead *= np.float32(1 / np.sqrt(1 - self.tilt**2))
         return ahead
 
+    @classmethod
+    def through(cls, plane: FloatArray, k: Intrinsics) -> Floor:
+        """The floor ``plane @ p = 1``, ``(3,)`` in the camera's frame, as a view shows it."""
+        x, y, z = plane.tolist()
+        a, b = x / k.fx, y / k.fy
+        height = 1 / math.sqrt(x * x + y * y + z * z)
+        return cls(a, b, z - a * k.cx - b * k.cy, height, z * height)
+
+    def plane(self, k: Intrinsics) -> FloatArray:
+        """The numbers ``(3,)`` with which ``plane @ p = 1`` on the floor, in the camera's frame."""
+        return np.array([self.a * k.fx, self.b * k.fy, self.c + self.a * k.cx + self.b * k.cy])
+
+    def carried(self, motion: Pose, k: Intrinsics) -> Floor:
+        """The floor as a camera shows it that has moved.
+
+        Args:
+            motion: the pose of the last camera's frame in that of now.
+            k: of the view.
+        """
+        turned = motion.rotation @ self.plane(k)
+        return self.through(turned / (1 + turned @ motion.translation), k)
+
     def axes(self, k: Intrinsics) -> FloatArray:
         """Unit vectors along the floor, ``(2, 3)`` in the camera's frame: to the right, and ahead.
 
         They are at right angles to each other however the camera rolls.
         """
-        down = np.array([self.a * k.fx, self.b * k.fy, self.c + self.a * k.cx + self.b * k.cy])
-        down *= self.height
+        down = self.height * self.plane(k)
         level = np.array([0.0, 0.0, 1.0]) - down[2] * down
         ahead = level / np.linalg.norm(level)
         return np.stack((np.cross(down, ahead), ahead))
@@ -128,13 +151,21 @@ class FloorFinder:
         self._floor: Floor | None = None
         self._wait = 0
 
-    def update(self, view: DepthView, learns: bool = True) -> Floor | None:
+    def update(
+        self, view: DepthView, learns: bool = True, motion: Pose | Lost | None = None
+    ) -> Floor | None:
         """The floor of this view, or None where no plane passes for one.
+
+        A floor that is known is where it was, however little of it shows, as long as it is known
+        how the camera has moved.
 
         Args:
             view: the depth.
             learns: whether a floor that is known is fitted again.
+            motion: the pose of the last view's camera in that of now; None where it stood still.
         """
+        if isinstance(motion, Pose) and self._floor is not None:
+            self._floor = self._floor.carried(motion, view.intrinsics)
         if self._floor is not None and not learns:
             return self._floor
         h = view.shape[0]
@@ -147,16 +178,22 @@ class FloorFinder:
         even = ~(np.abs(above + below - 2 * here) >= EVEN * here)
         v, u = np.nonzero(even & (here > 0))
         if len(v) < LEAST:
-            self._floor = None
-            return None
+            if isinstance(motion, Lost):
+                self._floor = None
+            return self._floor
         z = 1 / here[v, u].astype(np.float64)
         v, u = top + STRIDE * v, REACH + STRIDE * u
         points: FloatArray = np.stack((u, v, np.ones(len(z))), axis=1)
         # In terms of these the distance from a plane is 1 - rays @ plane, in camera heights.
         rays: FloatArray = points * z[:, None]
         if self._floor is not None:
-            f = self._floor
-            self._floor = self._refined(np.array([f.a, f.b, f.c]), rays, z, view.intrinsics)
+            known = self._floor
+            plane = np.array([known.a, known.b, known.c])
+            self._floor = self._refined(plane, rays, z, view.intrinsics)
+            if self._floor is None and not isinstance(motion, Lost):
+                under = known.height * (1.0 - rays @ plane) < BELOW * _noise(z)
+                if np.count_nonzero(under) < MIN_SHARE * len(z):
+                    self._floor = known
             if self._floor is not None:
                 return self._floor
         if self._wait > 0:

@@ -139,12 +139,17 @@ class SceneReader:
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
+            self._floors = FloorFinder()
         moves = self.stood_for == 0.0
         fast = not moves and 0 < seconds < LEARNING_STEP / 2
         learns = not fast or self._learned >= LEARNING_STEP
         # Where frames come fast, looks are learned from another one than the room: none takes long.
         teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
-        floor = self._floors.update(view, learns) if self._floor_margin > 0 else None
+        image = view_image(frame.color, view.step, view.shape)
+        motion = self._move(image, view, frame.pose)
+        if isinstance(motion, Lost) and self.room.agrees(view.depth):
+            motion = None
+        floor = self._floors.update(view, learns, motion) if self._floor_margin > 0 else None
         elevation = floor.elevation(view.depth) if floor is not None else None
         forward, axes = view.depth, CAMERA_AXES
         if floor is not None and elevation is not None:
@@ -156,10 +161,6 @@ class SceneReader:
             self._rim = Rim.of(view)
         elif learns:
             self._rim = Rim.of(view).common(self._rim)
-        image = view_image(frame.color, view.step, view.shape)
-        motion = self._move(image, view, frame.pose)
-        if isinstance(motion, Lost) and self.room.agrees(view.depth):
-            motion = None
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
