@@ -242,6 +242,25 @@ def test_what_goes_on_from_somebody_as_one_surface_is_somebody():
     assert not few.any(), 'a few pixels tell nothing of the rest'
 
 
+@pytest.mark.parametrize('large', [True, False])
+def test_a_strip_of_a_wall_that_passed_for_somebody_is_taken_into_the_room(large: bool):
+    """A camera that turned saw a strip of a wall first, and it was somebody for good."""
+    strip, person = NOBODY.copy(), NOBODY.copy()
+    strip[20:150, 100:130] = True
+    person[40:150, 30:60] = True
+    depth = np.where(person, np.float32(3.0), wall()).astype(np.float32)
+    room = Room()
+    room.restart(depth, strip | person)
+    see(room, depth, 0.2, None)
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
+    assert not room.goes_on(person, depth, surfaces, np.ones(len(surfaces), bool))
+    assert room.goes_on(strip, depth, surfaces, np.full(len(surfaces), large)) == large
+    assert room.before[strip].any() != large
+    see(room, depth, 0.2, None)
+    assert room.before[strip].any() != large
+    assert room.before[person].all()
+
+
 def test_a_room_elsewhere_does_not_agree():
     room = known_room(with_thing())
     assert room.agrees(with_thing())
@@ -338,6 +357,8 @@ STILL = Pose(np.eye(3), np.zeros(3))
         turned(1.5, 0, 1, 0, 0, 0),
         turned(0, 0, 0, 0.12, 0.0, 0.0),
         turned(0.5, -2, 0, 0.03, -0.02, -0.1),
+        turned(0, 6, 2, 0, 0, 0),
+        turned(0, -7.5, 2, 0, 0, 0),
     ],
 )
 def test_the_cameras_motion_is_recovered(motion: Pose):
@@ -455,9 +476,9 @@ def test_what_lasts_is_learned_ten_times_a_second_where_frames_come_fast(
     learned, since = [], {}
     update = reader.room.update
 
-    def noticed(depth: Any, dt: float, somebody: Any, surfaces: Any, learns: bool) -> None:
-        learned.append(learns)
-        update(depth, dt, somebody, surfaces, learns)
+    def noticed(*given: Any) -> None:
+        learned.append(given[4])
+        update(*given)
 
     monkeypatch.setattr(reader.room, 'update', noticed)
     for i in range(max(looks) + 1):
@@ -587,8 +608,9 @@ def test_what_a_turning_camera_sees_of_a_part_is_nobody_until_both_its_sides_sho
         assert scene is not None
         left, right = max(int(one.box.x) + 2, 0), min(int(one.box.right) - 2, COLS)
         if right - left > 4:
-            share = scene.before[int(one.box.y) + 4 : 140, left:right].mean()
-            shown.append((one.box.right < COLS - 2, share > 0.5))
+            part = np.s_[int(one.box.y) + 4 : 140, left:right]
+            shown.append((one.box.right < COLS - 2, scene.before[part].mean() > 0.5))
+            assert (reader.room.depth[part] > 0).mean() < 0.2, 'nor is he room'
     assert {whole for whole, _ in shown} == {False, True}
     assert all(told == whole for whole, told in shown), shown
 

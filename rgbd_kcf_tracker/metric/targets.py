@@ -210,6 +210,10 @@ class MetricTargets:
             for number, seen in targets.items():
                 if seen is not None and number not in unsure:
                     self._reader.is_somebody(seen)
+            # And what had somebody's shape while only a part of it was in view may be room.
+            for person, seen in self.account.unmoved:
+                if self._reader.is_room(seen, self.account.scene):
+                    person.upright = False
 
     def _name(self, person: Person | None) -> int:
         """The id of a person, or a new one."""

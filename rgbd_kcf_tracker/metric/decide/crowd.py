@@ -173,6 +173,13 @@ class Account:
         """Whoever a sight of the frame is of."""
         return [self.people[row] for row in self.owner if row >= 0]
 
+    @property
+    def unmoved(self) -> list[tuple[Person, Silhouette]]:
+        """Those in view whom nobody chose and who have never walked, and where they are."""
+        pairs = zip(self.owner, self.sights, strict=True)
+        seen = [(self.people[row], sight.figure.seen) for row, sight in pairs if row >= 0]
+        return [each for each in seen if not each[0].chosen and each[0].travelled < TRAVELLED]
+
     def was_away(self, person: Person) -> bool:
         """Whether somebody has been absent for so long that his place says little."""
         return absent(self.time - person.seen_at, person.misses)

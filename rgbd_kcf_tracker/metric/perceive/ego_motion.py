@@ -11,6 +11,7 @@ leave out whoever walks (Cauchy's).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -46,6 +47,9 @@ depth may be that of either side of an edge."""
 ITERATIONS = 8
 """Rounds of fitting. In the first four the pixels within which a corner counts fall from 4 to 0.7,
 so that those on somebody who walks come to count little; four more at that settle the motion."""
+FAR = 4.0
+"""Pixels of the view by which corners move before a camera that turns fast: from standing still the
+fit of :data:`ITERATIONS` hardly finds that, as it begins with this scale."""
 STILL, LEAST_STILL = 0.3, 0.35
 """Pixels of flow up to which a corner stands still, and the share of them from which the camera
 does: somebody may have stepped before the others."""
@@ -170,26 +174,48 @@ def _told(
     first, second = (points.astype(np.float64) for points in corners)
     if stands(last, gray, first, second):
         return None
-    k = last_view.intrinsics
-    z = last_view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
+    motion = _agreed(first, second, last_view, np.zeros(3))
+    if motion is None:
+        # What has left the view is found anywhere, and from there nothing leads back.
+        back, found = followed(gray, last, second.astype(np.float32))
+        leads = found & (np.abs(back - first).max(axis=1) < AGREE)
+        first, second = first[leads], second[leads]
+        if len(first) >= LEAST_CORNERS:
+            right, down = np.median(second - first, axis=0).tolist()
+            if math.hypot(right, down) > FAR:
+                k = last_view.intrinsics
+                turn = np.array([-down / k.fy, right / k.fx, 0.0])
+                motion = _agreed(first, second, last_view, turn)
+    return Lost() if motion is None else motion
+
+
+def _agreed(
+    first: FloatArray, second: FloatArray, view: DepthView, turn: FloatArray
+) -> Pose | None:
+    """The motion that enough corners agree on, None where they do not.
+
+    Args:
+        first: ``(n, 2)`` the corners in the picture before.
+        second: ``(n, 2)`` where they are now.
+        view: the depth before.
+        turn: ``(3,)`` radians about each axis from which the motion is fitted.
+    """
+    k = view.intrinsics
+    z = view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
     points = np.stack(((first[:, 0] - k.cx) * z / k.fx, (first[:, 1] - k.cy) * z / k.fy, z), axis=1)
-    motion = _fitted(points, second, k)
+    motion = _fitted(points, second, k, turn)
     moved = motion.of(points)
     ahead = np.maximum(moved[:, 2], 0.05)
-    miss = np.hypot(
-        moved[:, 0] * k.fx / ahead + k.cx - second[:, 0],
-        moved[:, 1] * k.fy / ahead + k.cy - second[:, 1],
-    )
-    agreeing = int(np.count_nonzero(miss < AGREE))
-    if agreeing < max(LEAST_CORNERS, LEAST_AGREEING * len(points)):
-        return Lost()
-    return motion
+    u = moved[:, 0] * k.fx / ahead + k.cx
+    v = moved[:, 1] * k.fy / ahead + k.cy
+    agreeing = np.count_nonzero(np.hypot(u - second[:, 0], v - second[:, 1]) < AGREE)
+    return motion if agreeing >= max(LEAST_CORNERS, LEAST_AGREEING * len(points)) else None
 
 
-def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics) -> Pose:
-    """The motion that projects points ``(n, 3)`` to pixels ``(n, 2)``."""
-    rotation, shift = np.eye(3), np.zeros(3)
-    scale = 4.0
+def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray) -> Pose:
+    """The motion that projects points ``(n, 3)`` to pixels ``(n, 2)``, from a first turn on."""
+    rotation, shift = cv2.Rodrigues(start)[0], np.zeros(3)
+    scale = FAR
     for _ in range(ITERATIONS):
         x, y, z = (points @ rotation.T + shift).T
         z = np.maximum(z, 0.05)

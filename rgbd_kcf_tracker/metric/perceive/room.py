@@ -148,7 +148,6 @@ class Room:
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
         self._unlearned = 0.0
-        self._in_part: Mask = self.before
 
     def restart(self, depth: DepthArray, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -159,7 +158,6 @@ class Room:
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
         self._front = np.where(somebody, depth, np.float32(0))
-        self._in_part = np.zeros(depth.shape, np.bool_)
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
@@ -184,10 +182,8 @@ class Room:
             k: of the view.
 
         Returns:
-            ``(h, w)`` bool, the pixels of which nothing is known any more, and those that were
-            taken for room while only a part of what they show was in view.
+            ``(h, w)`` bool, the pixels of which nothing is known any more.
         """
-        in_part = _seen_from(np.where(self._in_part, self.depth, np.float32(0)), motion, k) > 0
         front = np.where((self.depth == 0) & (self._blind >= BLIND_FRAMES), self._front, 0)
         self.depth = _seen_from(self.depth, motion, k)
         self._front = _seen_from(front.astype(np.float32), motion, k)
@@ -196,12 +192,36 @@ class Room:
         self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._farther = np.zeros_like(self.depth)
         self._still_for = np.zeros_like(self.depth)
-        lost: Mask = (unknown & ~opened) | in_part
+        lost: Mask = unknown & ~opened
         return lost
 
-    def seen_in_part(self, pixels: Mask) -> None:
-        """Remember pixels, ``(h, w)`` bool, of what reaches beyond the end of the view."""
-        self._in_part = pixels
+    def goes_on(
+        self,
+        somebody: Mask,
+        depth: DepthArray,
+        surfaces: Surfaces,
+        large: npt.NDArray[np.bool_],
+    ) -> bool:
+        """Whether somebody, ``(h, w)`` bool, goes on as the room along most of where he meets it.
+
+        Then he is part of it, and is taken into it.
+
+        Args:
+            somebody: his pixels.
+            depth: ``(h, w)`` metres of the last view.
+            surfaces: of it.
+            large: ``(n,)`` bool, those of them that nobody can be.
+        """
+        known = (depth > 0) & (self.depth > 0) & ~somebody
+        nearer = known & (self.depth - depth > tolerance(depth))
+        room = large & _continues_room(somebody, known, nearer, surfaces)
+        part = somebody & room[surfaces.labels]
+        if np.count_nonzero(part) <= MOST * np.count_nonzero(somebody):
+            return False
+        self.depth[part] = depth[part]
+        self._blind[part] = 0
+        self.before &= ~part
+        return True
 
     def going_on(self, depth: DepthArray, surfaces: Surfaces) -> Mask:
         """Pixels, ``(h, w)`` bool, of surfaces of which what is known stands before the room.
@@ -227,6 +247,7 @@ class Room:
         somebody: Mask | None,
         surfaces: Surfaces,
         learns: bool = True,
+        undecided: Mask | None = None,
     ) -> None:
         """Compare the next view with the room and learn from it.
 
@@ -237,6 +258,8 @@ class Room:
                 stand still for as long as he likes; None for nobody.
             surfaces: of the view.
             learns: whether the room is learned from it, or only compared.
+            undecided: ``(h, w)`` bool, pixels that are not taken for room where it is not known;
+                None for none.
         """
         valid = depth > 0
         known = self.depth > 0
@@ -251,7 +274,10 @@ class Room:
         if len(open_):
             np.put(before, open_, self._taken(open_, depth, dt, allowed, both, before, surfaces))
         self.before, self.still = before, same
-        np.copyto(self.depth, depth, where=new & ~before)
+        new &= ~before
+        if undecided is not None:
+            new &= ~undecided
+        np.copyto(self.depth, depth, where=new)
         self._blind *= ~both
         missing = (~valid).view(np.uint8)
         np.minimum(self._blind, missing * _ANY_NUMBER + BLIND_FRAMES, out=self._blind)

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import upright_people
+from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, upright_people
 from rgbd_kcf_tracker.pose import Pose
 
 STILL, STILL_TURN = 0.003, 0.001
@@ -168,7 +168,7 @@ class SceneReader:
             self.room.restart(view.depth, people)
             self._light.restart()
         else:
-            somebody = self.somebody
+            somebody, undecided = self.somebody, None
             if isinstance(motion, Pose):
                 unknown = self.room.moved(motion, view.intrinsics)
                 people = upright_people(
@@ -176,10 +176,11 @@ class SceneReader:
                 )
                 people |= self.room.going_on(view.depth, surfaces)
                 self.room.open(people & unknown, view.depth)
-                self.room.seen_in_part(unknown & _at_side(surfaces, self._rim) & ~people)
+                # Whose other side comes into view next may be somebody or something.
+                undecided = _at_side(view, surfaces, self._rim)
                 self._light.restart()
                 somebody = None
-            self.room.update(view.depth, seconds, somebody, surfaces, learns)
+            self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
         since = self._taught if teaches else None
@@ -211,6 +212,20 @@ class SceneReader:
             mask[seen.rows, seen.cols] = seen.mask
             self.room.open(mask, self.last_view.depth)
 
+    def is_room(self, seen: Silhouette, scene: Scene) -> bool:
+        """Whether a silhouette of the last scene turns out to be part of the room it stands before.
+
+        It is taken into it then.
+
+        Args:
+            seen: the silhouette.
+            scene: the scene.
+        """
+        mask = np.zeros(scene.view.shape, np.bool_)
+        mask[seen.rows, seen.cols] = seen.mask
+        large = _large(scene.view, scene.surfaces)
+        return self.room.goes_on(mask, scene.view.depth, scene.surfaces, large)
+
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
     ) -> Pose | Lost | None:
@@ -231,14 +246,22 @@ class SceneReader:
         return moved
 
 
-def _at_side(surfaces: Surfaces, rim: Rim) -> Mask:
-    """The pixels, ``(h, w)`` bool, of surfaces that go on to the left or right of the view."""
+def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim) -> Mask:
+    """Pixels, ``(h, w)`` bool, of surfaces no larger than people that go on beside the view."""
     left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
-    columns = surfaces.labels.shape[1]
-    beyond = (left <= 1 + rim.left) | (left + width >= columns - 1 - rim.right)
+    beyond = (left <= 1 + rim.left) | (left + width >= view.shape[1] - 1 - rim.right)
+    beyond &= ~_large(view, surfaces)
     beyond[0] = False
     mask: Mask = beyond[surfaces.labels]
     return mask
+
+
+def _large(view: DepthView, surfaces: Surfaces) -> npt.NDArray[np.bool_]:
+    """Which surfaces are larger than anybody, ``(n,)`` bool."""
+    k, z = view.intrinsics, surfaces.depth
+    wide, tall = surfaces.boxes[:, 2] * z / k.fx, surfaces.boxes[:, 3] * z / k.fy
+    large: npt.NDArray[np.bool_] = (wide > WIDTH[1]) | (tall > HEIGHT[1])
+    return large
 
 
 def _stands(moved: Pose) -> bool:
