@@ -186,9 +186,11 @@ def test_a_floor_of_which_hardly_any_shows_is_where_it_was_however_the_camera_mo
     assert floor.height == pytest.approx(height, abs=0.01)
     assert floor.height * floor.plane(CAMERA) == pytest.approx(after, abs=0.01)
     assert finder.update(view_of(np.zeros((160, 240), np.float32))) is floor
-    again = finder.update(view_of(tilted_floor(after, height)))
+    again = finder.update(view_of(tilted_floor(after, height)), 0.2)
     assert again is not None
     assert again.height == pytest.approx(height, abs=0.005)
+    kept = [finder.update(view_of(near), 0.2) is not None for _ in range(8)]
+    assert kept == [True] * 6 + [False] * 2, 'while somebody passes, and not for good'
 
 
 def test_a_floor_below_which_something_lies_or_that_is_lost_is_none():

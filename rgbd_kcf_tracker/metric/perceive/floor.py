@@ -51,6 +51,10 @@ are among them. Where none is found it is tried again some frames later."""
 CLOSER = (1.0, 0.7, 0.5)
 """Rounds of fitting, and the noise up to which a reading lies on the floor in each: the lowest few
 centimetres of a wall or a chair leg are on it in the first, and would tilt it."""
+PASSES = 1.2
+"""Seconds for which a floor is kept of which too little shows: somebody passes near the camera in
+one. Kept for good, a worktop was the floor of a kitchen (`redkitchen`), and things on it were lost.
+"""
 BEST = 5
 """Planes that are fitted again, the best first, until one passes."""
 
@@ -150,20 +154,27 @@ class FloorFinder:
     def __init__(self) -> None:
         self._floor: Floor | None = None
         self._wait = 0
+        self._hidden = 0.0
 
     def update(
-        self, view: DepthView, learns: bool = True, motion: Pose | Lost | None = None
+        self,
+        view: DepthView,
+        seconds: float = 0.0,
+        learns: bool = True,
+        motion: Pose | Lost | None = None,
     ) -> Floor | None:
         """The floor of this view, or None where no plane passes for one.
 
-        A floor that is known is where it was, however little of it shows, as long as it is known
-        how the camera has moved.
+        A floor that is known is where it was, however little of it shows, for as long as somebody
+        passes and it is known how the camera has moved.
 
         Args:
             view: the depth.
+            seconds: since the last view.
             learns: whether a floor that is known is fitted again.
             motion: the pose of the last view's camera in that of now; None where it stood still.
         """
+        self._hidden = math.inf if isinstance(motion, Lost) else self._hidden + seconds
         if isinstance(motion, Pose) and self._floor is not None:
             self._floor = self._floor.carried(motion, view.intrinsics)
         if self._floor is not None and not learns:
@@ -178,7 +189,7 @@ class FloorFinder:
         even = ~(np.abs(above + below - 2 * here) >= EVEN * here)
         v, u = np.nonzero(even & (here > 0))
         if len(v) < LEAST:
-            if isinstance(motion, Lost):
+            if self._hidden > PASSES:
                 self._floor = None
             return self._floor
         z = 1 / here[v, u].astype(np.float64)
@@ -190,7 +201,9 @@ class FloorFinder:
             known = self._floor
             plane = np.array([known.a, known.b, known.c])
             self._floor = self._refined(plane, rays, z, view.intrinsics)
-            if self._floor is None and not isinstance(motion, Lost):
+            if self._floor is not None:
+                self._hidden = 0.0
+            elif self._hidden <= PASSES:
                 under = known.height * (1.0 - rays @ plane) < BELOW * _noise(z)
                 if np.count_nonzero(under) < MIN_SHARE * len(z):
                     self._floor = known
@@ -200,6 +213,7 @@ class FloorFinder:
             self._wait -= 1
             return None
         self._floor = self._searched(view, u, v, rays)
+        self._hidden = 0.0
         if self._floor is None:
             self._wait = 5
         return self._floor

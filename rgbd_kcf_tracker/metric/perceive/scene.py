@@ -149,7 +149,9 @@ class SceneReader:
         motion = self._move(image, view, frame.pose)
         if isinstance(motion, Lost) and self.room.agrees(view.depth):
             motion = None
-        floor = self._floors.update(view, learns, motion) if self._floor_margin > 0 else None
+        floor = (
+            self._floors.update(view, seconds, learns, motion) if self._floor_margin > 0 else None
+        )
         elevation = floor.elevation(view.depth) if floor is not None else None
         forward, axes = view.depth, CAMERA_AXES
         if floor is not None and elevation is not None:
