@@ -25,6 +25,8 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image
 from rgbd_kcf_tracker.bench.altered import (
+    add_reading,
+    camera_of,
     make_copy,
     names_of,
     parser_of,
@@ -34,16 +36,15 @@ from rgbd_kcf_tracker.bench.altered import (
     write_pair,
     write_truth,
 )
-from rgbd_kcf_tracker.cli.common import parse_intrinsics
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 
 WIDTH, HEIGHT = 0.62, 0.88
-"""Size of the copies, as shares of the recording's: with them no ray leaves the recording, from
-which people's feet and heads are cut no more than they are."""
+"""Size of the copies, as shares of the recording's: narrow enough to look aside, and high enough to
+show people from head to feet. Where the camera rolls, corners show what was not recorded."""
 SHOWS = 0.1
 """Who shows by no more than this share of what showed before is out of view, and by no more than
 three times as much may be found or not."""
@@ -177,16 +178,12 @@ def aim(frames: ImageFrames, people: everyone.People, out: Path, aims: Sequence[
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the copies; status 2 where one cannot be made."""
     parser = parser_of('aimed', __doc__)
-    parser.add_argument('--fps', type=float, default=30.0, help='of recordings without stamps')
+    add_reading(parser)
     parser.add_argument('--period', type=float, default=20.0, help='frames of once to and fro')
-    parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help='of recordings without')
     args = parser.parse_args(argv)
-    if not 0 < args.fps < math.inf or not 2 < args.period < math.inf:
-        parser.error('--fps must be a number above 0, and --period one above 2')
-    try:
-        camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
-    except ParameterError as error:
-        parser.error(str(error))
+    if not 2 < args.period < math.inf:
+        parser.error('--period must be a number above 2')
+    camera = camera_of(args, parser)
     names = names_of(args.folders, parser)
 
     def copies() -> Iterator[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -17,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Image
-from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
+from rgbd_kcf_tracker.cli.common import parse_intrinsics
+from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.geometry import Intrinsics
@@ -41,6 +43,27 @@ def parser_of(command: str, doc: str | None) -> argparse.ArgumentParser:
     parser.add_argument('folders', nargs='+', type=Path, metavar='FOLDER', help='recordings')
     parser.add_argument('--out', type=Path, required=True, help='folder of the copies')
     return parser
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add what tells of recordings what they do not tell themselves; see :func:`camera_of`."""
+    parser.add_argument('--fps', type=float, default=30.0, help='of recordings without stamps')
+    parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help='of recordings without')
+
+
+def camera_of(args: argparse.Namespace, parser: argparse.ArgumentParser) -> Intrinsics | None:
+    """The intrinsics given, if any; ends the command where they or the frames per second are none.
+
+    Args:
+        args: of the command line.
+        parser: of it, see :func:`add_reading`.
+    """
+    if not 0 < args.fps < math.inf:
+        parser.error('--fps must be a number above 0')
+    try:
+        return None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
+    except ParameterError as error:
+        parser.error(str(error))
 
 
 def names_of(folders: Iterable[Path], parser: argparse.ArgumentParser) -> list[str]:

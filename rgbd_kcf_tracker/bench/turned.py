@@ -15,12 +15,13 @@ copy that begins with the first and one with the second.
 from __future__ import annotations
 
 import dataclasses
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rgbd_kcf_tracker.bench.altered import (
+    add_reading,
+    camera_of,
     make_copy,
     names_of,
     parser_of,
@@ -30,8 +31,7 @@ from rgbd_kcf_tracker.bench.altered import (
     write_pair,
     write_truth,
 )
-from rgbd_kcf_tracker.cli.common import parse_intrinsics
-from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.geometry import Box
@@ -90,16 +90,12 @@ def _mirrored(one: Annotation, width: int) -> Annotation:
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the copies; status 2 where one cannot be made."""
     parser = parser_of('turned', __doc__)
-    parser.add_argument('--fps', type=float, default=30.0, help='of recordings without stamps')
+    add_reading(parser)
     parser.add_argument('--every', type=int, default=1, help='frames of which the copies have one')
-    parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help='of recordings without')
     args = parser.parse_args(argv)
-    if not 0 < args.fps < math.inf or args.every < 1:
-        parser.error('--fps must be a number above 0, and --every 1 or more')
-    try:
-        camera = None if args.intrinsics is None else parse_intrinsics(args.intrinsics)
-    except ParameterError as error:
-        parser.error(str(error))
+    if args.every < 1:
+        parser.error('--every must be 1 or more')
+    camera = camera_of(args, parser)
     names = names_of(args.folders, parser)
 
     def copies() -> Iterator[str]:

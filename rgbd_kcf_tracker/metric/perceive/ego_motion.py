@@ -175,17 +175,19 @@ def _told(
     if stands(last, gray, first, second):
         return None
     motion = _agreed(first, second, last_view, np.zeros(3))
-    if motion is None:
-        # What has left the view is found anywhere, and from there nothing leads back.
-        back, found = followed(gray, last, second.astype(np.float32))
-        leads = found & (np.abs(back - first).max(axis=1) < AGREE)
-        first, second = first[leads], second[leads]
-        if len(first) >= LEAST_CORNERS:
-            right, down = np.median(second - first, axis=0).tolist()
-            if math.hypot(right, down) > FAR:
-                k = last_view.intrinsics
-                turn = np.array([-down / k.fy, right / k.fx, 0.0])
-                motion = _agreed(first, second, last_view, turn)
+    if motion is not None:
+        return motion
+    # What has left the view is found anywhere, and from there nothing leads back.
+    back, found = followed(gray, last, second.astype(np.float32))
+    leads = found & (np.abs(back - first).max(axis=1) < AGREE)
+    first, second = first[leads], second[leads]
+    if len(first) < LEAST_CORNERS:
+        return Lost()
+    right, down = np.median(second - first, axis=0).tolist()
+    if math.hypot(right, down) <= FAR:
+        return Lost()
+    k = last_view.intrinsics
+    motion = _agreed(first, second, last_view, np.array([-down / k.fy, right / k.fx, 0.0]))
     return Lost() if motion is None else motion
 
 

@@ -210,9 +210,7 @@ class SceneReader:
     def is_somebody(self, seen: Silhouette) -> None:
         """Take the pixels of a silhouette of the last scene out of what stands still."""
         if self.last_view is not None:
-            mask = np.zeros(self.last_view.shape, np.bool_)
-            mask[seen.rows, seen.cols] = seen.mask
-            self.room.open(mask, self.last_view.depth)
+            self.room.open(seen.in_view(self.last_view.shape), self.last_view.depth)
 
     def is_room(self, seen: Silhouette, scene: Scene) -> bool:
         """Whether a silhouette of the last scene turns out to be part of the room it stands before.
@@ -223,10 +221,8 @@ class SceneReader:
             seen: the silhouette.
             scene: the scene.
         """
-        mask = np.zeros(scene.view.shape, np.bool_)
-        mask[seen.rows, seen.cols] = seen.mask
-        large = _large(scene.view, scene.surfaces)
-        return self.room.goes_on(mask, scene.view.depth, scene.surfaces, large)
+        mask = seen.in_view(scene.view.shape)
+        return self.room.goes_on(mask, scene.view.depth, scene.surfaces, _large(scene.sizes))
 
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
@@ -252,17 +248,15 @@ def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim) -> Mask:
     """Pixels, ``(h, w)`` bool, of surfaces no larger than people that go on beside the view."""
     left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
     beyond = (left <= 1 + rim.left) | (left + width >= view.shape[1] - 1 - rim.right)
-    beyond &= ~_large(view, surfaces)
+    beyond &= ~_large(Sizes.of(surfaces, view.intrinsics))
     beyond[0] = False
     mask: Mask = beyond[surfaces.labels]
     return mask
 
 
-def _large(view: DepthView, surfaces: Surfaces) -> npt.NDArray[np.bool_]:
+def _large(sizes: Sizes) -> npt.NDArray[np.bool_]:
     """Which surfaces are larger than anybody, ``(n,)`` bool."""
-    k, z = view.intrinsics, surfaces.depth
-    wide, tall = surfaces.boxes[:, 2] * z / k.fx, surfaces.boxes[:, 3] * z / k.fy
-    large: npt.NDArray[np.bool_] = (wide > WIDTH[1]) | (tall > HEIGHT[1])
+    large: npt.NDArray[np.bool_] = (sizes.width > WIDTH[1]) | (sizes.height > HEIGHT[1])
     return large
 
 

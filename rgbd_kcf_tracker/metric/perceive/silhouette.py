@@ -120,6 +120,12 @@ class Silhouette:
         """True where it reaches the end of what the camera sees."""
         return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view).any
 
+    def in_view(self, shape: tuple[int, int]) -> Mask:
+        """Its pixels in a view of a shape, ``(h, w)`` bool."""
+        mask = np.zeros(shape, np.bool_)
+        mask[self.rows, self.cols] = self.mask
+        return mask
+
     def at_side(self, view: DepthView, rim: Rim) -> bool:
         """True where it reaches the end of what the camera sees to the left or to the right."""
         ends = rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
