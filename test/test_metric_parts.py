@@ -193,6 +193,17 @@ def test_a_floor_of_which_hardly_any_shows_is_where_it_was_however_the_camera_mo
     assert kept == [True] * 6 + [False] * 2, 'while somebody passes, and not for good'
 
 
+@pytest.mark.parametrize('down', [-1.4, -1.399999, -1.3, 1.0, 3.0, 1e9])
+def test_a_camera_that_leaps_below_the_floor_or_far_above_it_has_none(down: float):
+    """Poses that are given may be anything."""
+    finder = FloorFinder()
+    assert finder.update(view_of(tilted_floor(np.array([0.0, 1.0, 0.0]), 1.4))) is not None
+    leap = Pose(np.eye(3), np.array([0.0, down, 0.0]))
+    floor = finder.update(view_of(np.full((160, 240), 0.8, np.float32)), 0.1, motion=leap)
+    assert (floor is not None) == (down == 1.0)
+    assert floor is None or floor.height == pytest.approx(1.4 + down, abs=0.01)
+
+
 def test_a_floor_below_which_something_lies_or_that_is_lost_is_none():
     down = np.array([0.0, 1.0, 0.0])
     for motion, nearer in ((Lost(), 0.8), (None, 5.0)):

@@ -109,15 +109,20 @@ class Floor:
         """The numbers ``(3,)`` with which ``plane @ p = 1`` on the floor, in the camera's frame."""
         return np.array([self.a * k.fx, self.b * k.fy, self.c + self.a * k.cx + self.b * k.cy])
 
-    def carried(self, motion: Pose, k: Intrinsics) -> Floor:
-        """The floor as a camera shows it that has moved.
+    def carried(self, motion: Pose, k: Intrinsics) -> Floor | None:
+        """The floor as a camera shows it that has moved, None where none can be for it.
 
         Args:
             motion: the pose of the last camera's frame in that of now.
             k: of the view.
         """
         turned = motion.rotation @ self.plane(k)
-        return self.through(turned / (1 + turned @ motion.translation), k)
+        above = float(1 + turned @ motion.translation)  # in camera heights
+        if above <= 0:
+            return None
+        floor = self.through(turned / above, k)
+        heights = _heights(np.array([[floor.a, floor.b, floor.c]]), k)
+        return None if math.isnan(heights[0]) else floor
 
     def axes(self, k: Intrinsics) -> FloatArray:
         """Unit vectors along the floor, ``(2, 3)`` in the camera's frame: to the right, and ahead.
