@@ -110,6 +110,15 @@ def test_what_cannot_be_aimed_is_said(
     assert aimed.main([str(recording), *LINE, *out]) == 0
     assert aimed.main([str(recording), *LINE, *out]) == 2
     assert 'is there already' in capsys.readouterr().err
+    (recording / 'mot.txt').write_text('1,7,0,40,12,60,1,0,0,3\n')  # at the left end alone
+    some = tmp_path / 'some'
+    assert aimed.main([str(recording), *LINE, '--out', str(some)]) == 0
+    assert 'right_room: left out' in capsys.readouterr().out
+    assert [path.name for path in some.iterdir()] == ['left_room']
+    far = [str(recording), '--fps', '5', '--intrinsics', '150,150,9000,74.5']
+    assert aimed.main([*far, '--out', str(tmp_path / 'none')]) == 2
+    assert 'shows nobody to any of these cameras' in capsys.readouterr().err
+    assert not (tmp_path / 'none').exists()
     for wrong in (['--period', '2'], ['--fps', '0'], ['--intrinsics', '1,2']):
         with pytest.raises(SystemExit, match='2'):
             aimed.main([str(recording), *LINE, *wrong, *out])

@@ -92,20 +92,19 @@ class View:
         )
         self._of = camera
         self._turn = rotation(aim)
+
+    def shown(self, color: Image, depth: Floats) -> tuple[Image, Floats]:
+        """The recording's colours and depth as it shows them.
+
+        Args:
+            color: ``(H, W, 3)`` BGR; beyond its end it is black.
+            depth: ``(H, W)`` metres, which become distance ahead; NaN where unknown.
+        """
         columns, rows = np.meshgrid(np.arange(1.0 * self.width), np.arange(1.0 * self.height))
-        there, farther = _through(columns, rows, self.camera, camera, self._turn)
-        self._at, self._farther = there.astype(np.float32), farther.astype(np.float32)
-
-    def color(self, image: Image) -> Image:
-        """The recording's colours, ``(H, W, 3)``, as it shows them; black beyond their end."""
-        shown: Image = cv2.remap(image, self._at, None, cv2.INTER_LINEAR)
-        return shown
-
-    def depth(self, image: Floats) -> Floats:
-        """The recording's depth, ``(H, W)`` metres, as distance ahead; NaN where unknown."""
-        nearest = cv2.remap(image, self._at, None, cv2.INTER_NEAREST, borderValue=math.nan)
-        shown: Floats = nearest / self._farther
-        return shown
+        there, farther = _through(columns, rows, self.camera, self._of, self._turn)
+        at = there.astype(np.float32)
+        nearest = cv2.remap(depth, at, None, cv2.INTER_NEAREST, borderValue=math.nan)
+        return cv2.remap(color, at, None, cv2.INTER_LINEAR), nearest / farther.astype(np.float32)
 
     def seen(self, one: Annotation) -> Annotation | None:
         """Somebody as it shows them, None where it does not."""
@@ -113,7 +112,9 @@ class View:
         middle = box.x + box.width / 2, box.y + box.height / 2
         columns = np.array([box.x, box.right, middle[0], middle[0]])
         rows = np.array([middle[1], middle[1], box.y, box.bottom])
-        at, _ = _through(columns, rows, self._of, self.camera, self._turn.T)
+        at, ahead = _through(columns, rows, self._of, self.camera, self._turn.T)
+        if (ahead <= 0).any():  # beside the camera, or behind it
+            return None
         whole = Box.from_corners(at[0, 0], at[2, 1], at[1, 0], at[3, 1])
         part = whole.clipped(self.width, self.height)
         share = 0.0 if part is None else part.area / whole.area
@@ -149,30 +150,35 @@ def _through(
     return np.stack(at, axis=-1), ahead
 
 
-def aim(frames: ImageFrames, people: everyone.People, out: Path, aims: Sequence[Aim]) -> None:
+def aim(frames: ImageFrames, people: everyone.People, out: Path, views: Sequence[View]) -> bool:
     """Write a copy of a recording as a camera would have taken it that looks elsewhere.
 
     Args:
         frames: all of the recording, each with depth and all by one camera without a lens.
         people: who is in them.
         out: is made.
-        aims: where the camera looks, frame by frame.
+        views: what the camera shows, frame by frame.
+
+    Returns:
+        False where it would show nobody, and nothing is written.
 
     Raises:
         RgbdKcfError: where it is there, or cannot be made.
     """
+    truth = [
+        [seen for each in people.get(index, []) if (seen := view.seen(each)) is not None]
+        for index, view in enumerate(views)
+    ]
+    if not any(truth):
+        return False
     make_copy(out, 'rgb', 'depth')
-    truth: list[list[Annotation]] = []
-    for index, where in enumerate(aims):
+    for index, view in enumerate(views):
         frame = frames.frame(index)
         assert frame.depth is not None
-        assert frames.intrinsics is not None
-        view = View(frames.intrinsics, (frame.width, frame.height), where)
-        write_pair(out, index + 1, view.color(frame.color), view.depth(frame.depth))
-        seen = [view.seen(each) for each in people.get(index, [])]
-        truth.append([each for each in seen if each is not None])
+        write_pair(out, index + 1, *view.shown(frame.color, frame.depth))
     write_truth(out, frames.stamps_ns, truth)
-    write_camera(out, view.camera)
+    write_camera(out, views[0].camera)
+    return True
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -191,8 +197,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             frames, people = read_with_depth(folder, args.fps, camera)
             if frames.intrinsics is None:
                 raise RecordingError(f'{folder} does not say by what camera: give --intrinsics')
-            width = frames.frame(0).width
-            half = width / 2 / frames.intrinsics.fx
+            first = frames.frame(0)
+            half = first.width / 2 / frames.intrinsics.fx
             reach = math.atan(half) - math.atan(WIDTH * half)
             shares = [index / args.period for index in range(len(frames))]
             ways = {
@@ -200,10 +206,21 @@ def main(argv: Sequence[str] | None = None) -> int:
                 'right': [(reach, 0.0, 0.0)] * len(frames),
                 'turning': [turning(share, reach) for share in shares],
             }
+            written = 0
             for way, aims in ways.items():
                 out = args.out / f'{way}_{name}'
-                aim(frames, people, out, aims)
-                yield f'{out}: {len(frames)} pairs'
+                size = first.width, first.height
+                views = [View(frames.intrinsics, size, where) for where in aims]
+                if aim(frames, people, out, views):
+                    written += 1
+                    yield f'{out}: {len(frames)} pairs'
+                else:
+                    yield f'{out}: left out, as nobody shows there'
+            if not written:
+                raise RecordingError(
+                    f'{folder} shows nobody to any of these cameras: check its ground truth and '
+                    'the intrinsics'
+                )
 
     return write_copies(args.out, args.folders, copies)
 
