@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import cv2
@@ -32,7 +33,15 @@ from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
 from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
-from rgbd_kcf_tracker.metric.decide.arrivals import GONE, RETURN, Arrivals, away, bounded
+from rgbd_kcf_tracker.metric.decide.arrivals import (
+    GONE,
+    RETURN,
+    Arrival,
+    Arrivals,
+    away,
+    bounded,
+    is_new,
+)
 from rgbd_kcf_tracker.metric.decide.crowd import (
     MOST_PEOPLE,
     NEW_AREA,
@@ -399,6 +408,32 @@ def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     assert one.resemblance(7) == pytest.approx(-2.0, abs=0.01)
 
 
+def test_somebody_is_any_of_those_he_is_like_but_none_whom_he_met_and_none_of_them_twice():
+    one = Person(1, np.zeros(2), 0.0)
+    assert one.seen_before({7: 1.0}) == -np.inf, 'he was compared with nobody'
+    one.resembled(7, 3.0, 1.0, 0.0)
+    one.resembled(8, 3.0, 1.0, 0.0)
+    assert one.seen_before({7: 1.0}) == pytest.approx(3.0)
+    assert one.seen_before({7: 1.0, 8: 1.0}) == pytest.approx(3.0 + np.log(2))
+    assert one.seen_before({7: 1.0, 8: 0.0}) == pytest.approx(3.0), 'the one is the other'
+    one.met.add(7)
+    assert one.seen_before({7: 1.0, 8: 0.5}) == pytest.approx(3.0 - np.log(2))
+    one.resembled(9, 3.0, 0.1, 0.0)
+    assert one.seen_before({9: 1.0}) < 1.0, 'a tenth of somebody says little of who he is'
+
+
+def test_who_is_known_twice_stays_where_he_was_seen_last():
+    old, late = Person(1, np.zeros(2), 0.0), Person(2, np.ones(2), 5.0)
+    old.moved_to(np.array([3.0, 3.0]), 9.0)
+    old.become(late)
+    assert old.place == pytest.approx([3.0, 3.0])
+    assert old.seen_at == 9.0
+    newer = Person(3, np.array([4.0, 4.0]), 20.0)
+    old.become(newer)
+    assert old.place == pytest.approx([4.0, 4.0])
+    assert old.seen_at == 20.0
+
+
 # -- who comes ------------------------------------------------------------------------------------
 
 
@@ -410,18 +445,41 @@ def test_the_more_were_new_the_less_likely_somebody_comes_back_and_the_other_way
     street, home = Arrivals(), Arrivals()
     for _ in range(20):
         home.returned(100.0)
-    gone = [0.0, 0.0, 100.0]
-    assert street.against([0.0, 100.0]) < street.against(gone)
+    gone = [Arrival(0.0), Arrival(0.0), Arrival(100.0)]
+    assert street.against(gone[1:]) < street.against(gone)
     assert home.against(gone) < RETURN < street.against(gone)
-    assert home.against([100.0]) == 0.0, 'that nobody is new is never taken for granted'
+    assert home.against(gone[2:]) == 0.0, 'that nobody is new is never taken for granted'
     street.forgotten = 100
     assert street.against(gone) > RETURN + 2
 
 
 def test_each_of_those_who_are_away_is_as_likely_as_the_other():
     arrivals = Arrivals()
-    one, four = arrivals.against([0.0] * 3 + [1e6]), arrivals.against([1e6] * 4)
+    here, gone = Arrival(0.0), Arrival(1e6)
+    one, four = arrivals.against([here] * 3 + [gone]), arrivals.against([gone] * 4)
     assert four - one == pytest.approx(np.log(4))
+
+
+def test_who_is_as_likely_new_as_not_counts_as_half_of_both():
+    assert is_new(-np.inf, 2.0) == 1.0
+    assert is_new(2.0, 2.0) == 0.5
+    assert is_new(1e6, 2.0) == pytest.approx(0.0)
+    # Five came, one of whom is as likely one of the others; none is away.
+    came = [Arrival(0.0)] * 4 + [Arrival(0.0, again=RETURN)]
+    assert Arrivals().against(came) == pytest.approx(np.log((4.5 + np.exp(RETURN)) / 1.5))
+
+
+def test_those_who_came_back_unrecognised_tell_that_people_come_back():
+    """Each would have been one more who is new, and nobody would ever have been recognised."""
+    arrivals = Arrivals()
+    six = [Arrival(100.0)] * 6
+    first = arrivals.against(six)
+    again = six + [Arrival(100.0, again=first - 0.3)] * 12
+    odds = [arrivals.against(again) for _ in range(20)]
+    assert all(later <= before + 1e-9 for before, later in itertools.pairwise(odds))
+    assert odds[-1] < first - 1.0
+    # That they are neither of those who went leaves it as it was: they are twelve more.
+    assert Arrivals().against(six + [Arrival(100.0, again=-20.0)] * 12) > first + 1.0
 
 
 def test_who_was_missed_for_a_moment_is_not_away():
@@ -714,6 +772,23 @@ def test_a_stranger_is_not_taken_for_who_has_left():
     assert other.number != first.number
     watched.wait(20)
     assert watched.walk(-1.0, 1.0, 3.0, RED) is first
+
+
+def test_who_comes_back_is_known_again_though_many_were_new_before_him():
+    """Once six had come, nobody was recognised any more: each return was one more who is new."""
+    watched = Watched()
+    shirts = (RED, GREEN, BLUE, (40, 200, 220), (200, 60, 200), (200, 200, 60), (235, 235, 235))
+    rounds: list[list[int]] = []
+    for _ in range(4):
+        rounds.append([])
+        for shirt in shirts:
+            for x in (-0.9, 0.0, 0.9):
+                account = watched.see(Someone(x, 3.0, shirt), dt=1.0)
+            rounds[-1].append(who(account, 0).number)
+            for _ in range(4):
+                watched.see(dt=1.0)
+    assert len(set(rounds[0])) == len(shirts), 'they look like nobody else'
+    assert rounds[3] == rounds[0]
 
 
 def test_two_who_change_places_keep_who_they_are():

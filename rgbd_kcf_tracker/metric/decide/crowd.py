@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.arrays import FloatArray
-from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrivals, away
+from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrival, Arrivals, away, is_new
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
@@ -88,9 +88,9 @@ MOST = 0.5
 """Share of a silhouette's pixels from which it is taken to be the same as a figure, and of the
 figure's area: more than half, so that it is never the same as two."""
 SAME_AGAIN = 0.5
-"""Log-odds beyond those against coming back, and ahead of anybody else, at which a newcomer is
-somebody who was here before. With those against it they are seven to one, as for
-:data:`~.mix_ups.MIXED_UP`."""
+"""Log-odds beyond those against coming back, and ahead of anybody else, at which somebody is one
+who was here before, by one sight or by several: a number given to a stranger is worse than one more
+number. With those against it they are seven to one, as for :data:`~.mix_ups.MIXED_UP`."""
 REUNION, PAUSE = 1.0, 3.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place; and
 the same where hardly a frame was taken meanwhile, as by a slow camera. Within a second a walker
@@ -312,8 +312,13 @@ class Account:
             enough: sightings from which that is said, counted by how much showed: a first one alone
                 seldom tells, what several say together does.
         """
+        # Who once came back unrecognised is known twice: it is the first that he is.
         alike = [
-            (newcomer.resembles(person.number, enough), index)
+            (
+                newcomer.resembles(person.number, enough)
+                + math.log(is_new(person.again, self.against)),
+                index,
+            )
             for index, person in enumerate(self.people)
             if person.number not in newcomer.met
             and (person.chosen or person.seen_at < newcomer.first_seen)
@@ -371,7 +376,8 @@ class Crowd:
         others = [p for p in self.people if not p.chosen]
         if len(others) >= MOST_PEOPLE:
             forgotten = min(others, key=lambda p: (p.alive, p.seen_at))
-            self._arrivals.forgotten += forgotten.alive
+            if forgotten.alive:
+                self._arrivals.forgotten += is_new(forgotten.again, self._arrivals.last)
             self.people.remove(forgotten)
         person = Person(self._next, place, time, chosen)
         self._next += 1
@@ -473,7 +479,9 @@ class Crowd:
         self, scene: Scene, sights: list[Sight], time: float
     ) -> tuple[Account, Likeness]:
         """The account of a frame, and the likeness of each sight to each known view, ``(v, n)``."""
-        against = self._arrivals.against(time - p.seen_at for p in self.people if p.alive)
+        against = self._arrivals.against(
+            Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
+        )
         odds, looks, alike = self._odds(sights, time, against)
         account = Account(
             scene,
@@ -529,6 +537,9 @@ class Crowd:
             if missed:
                 look = float(account.looks[other, column])
                 newcomer.resembled(person.number, look, shows, account.time)
+        if not newcomer.chosen:
+            new = {p.number: is_new(p.again, account.against) for p in account.people}
+            newcomer.again = newcomer.seen_before(new)
 
     def _odds(
         self, sights: list[Sight], time: float, against: float
@@ -555,7 +566,7 @@ class Crowd:
                 looks[row, column] = person.gallery.log_odds(sight.view, most)
             odds[row] = person.place_log_odds(places, time)
             if not person.chosen:
-                odds[row] -= against * away(time - person.seen_at)
+                odds[row] -= (against + SAME_AGAIN) * away(time - person.seen_at)
         odds += looks
         return odds, looks, alike
 
@@ -626,19 +637,24 @@ class Crowd:
         self._reunite(account)
 
     def _reunite(self, account: Account) -> None:
-        """Give newcomers the number of whom they have turned out to be."""
-        for column, row in enumerate(account.owner):
-            if row < 0 or account.people[row].chosen:
+        """Give newcomers the number of whom they have turned out to be.
+
+        So are those who went meanwhile, where those who came later tell that people come back here.
+        """
+        for newcomer in list(account.people):
+            if newcomer.chosen or newcomer.again < account.against + SAME_AGAIN:
                 continue
-            newcomer = account.people[row]
             person = account.likest(newcomer, ENOUGH)
             if person is None or person.chosen:  # he is recognised by who follows him
                 continue
             if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
+            row = account.people.index(newcomer)
+            account.owner = [
+                account.people.index(person) if each == row else each for each in account.owner
+            ]
             person.become(newcomer)
-            account.owner[column] = account.people.index(person)
             if newcomer in self.people:
                 self.people.remove(newcomer)
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -78,6 +79,8 @@ class Person:
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
+        again: log-odds that it is one of those who had gone before it came, by its looks alone, see
+            :class:`~rgbd_kcf_tracker.metric.decide.arrivals.Arrival`.
     """
 
     def __init__(self, number: int, place: FloatArray, time: float, chosen: bool = False) -> None:
@@ -90,7 +93,7 @@ class Person:
         self.hidden = True
         self.met: set[int] = set()
         self.last: Silhouette | None = None
-        self.area = 0.0
+        self.area, self.again = 0.0, -math.inf
         self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
 
@@ -169,11 +172,26 @@ class Person:
         """Log-odds of looking like another, by all sightings of late; 0 where there are too few."""
         return self._resembles[other].odds(enough) if other in self._resembles else 0.0
 
+    def seen_before(self, new: Mapping[int, float]) -> float:
+        """Log-odds of being any of some who had gone, rather than somebody new, by looks alone.
+
+        Args:
+            new: for the number of each, how likely he was new himself when he came, 0 to 1; else
+                he is one of the others once more.
+        """
+        same = sum(
+            share * math.exp(self._resembles[number].believed)
+            for number, share in new.items()
+            if number in self._resembles and number not in self.met
+        )
+        return math.log(same) if same > 0 else -math.inf
+
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""
-        self.place, self.velocity = newcomer.place, newcomer.velocity
-        self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
-        self.hidden = newcomer.hidden
+        if newcomer.seen_at > self.seen_at:
+            self.place, self.velocity = newcomer.place, newcomer.velocity
+            self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
+            self.hidden = newcomer.hidden
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright
@@ -200,6 +218,7 @@ class Person:
         self.gallery.take(his)
         other.gallery.take(mine)
         self._resembles, other._resembles = {}, {}
+        self.again = other.again = -math.inf
 
     def carried(self, motion: Pose, axes: FloatArray, now: FloatArray) -> None:
         """Keep the place and the velocity in the world while the camera moves.

@@ -13,6 +13,9 @@ which may be of a mixed outline."""
 LATELY = 1.5
 """Seconds after which a sighting says a third of what it said: at first often little of somebody
 shows, or somebody else beside him, and a number may have gone over from one to another."""
+GLIMPSE = 0.5
+"""Sightings, counted the same way, of which less is believed less: mixed outlines are mostly of
+those of whom little shows."""
 AGAIN = 0.25
 """What twice as many sightings say more, as a share of what one says: little, as those that follow
 each other show nearly the same."""
@@ -42,6 +45,11 @@ class Tally:
     def mean(self) -> float | None:
         """Mean log-odds; None where nothing was seen."""
         return self._total / self._count if self._count > 0 else None
+
+    @property
+    def believed(self) -> float:
+        """Log-odds by all of them, less where less than a glimpse was seen."""
+        return self.odds(enough=0.0) * min(1.0, self._count / GLIMPSE)
 
     def odds(self, enough: float = ENOUGH) -> float:
         """Log-odds by all of them; 0 where they count less than ``enough``.
