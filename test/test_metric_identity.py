@@ -30,6 +30,7 @@ from people_rig import (
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.insight import of_metric
+from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
 from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
@@ -52,6 +53,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import (
     Sight,
 )
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
+from rgbd_kcf_tracker.metric.follower import EVEN
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
@@ -1591,6 +1593,19 @@ def back_again(*shown: tuple[list[Someone], Box | None]) -> list[Track]:
         targets.update(picture(people, 6.3 + 0.1 * i, board))[number]
         for i, (people, board) in enumerate(shown)
     ]
+
+
+def test_who_is_more_likely_somebody_else_has_no_box(monkeypatch: pytest.MonkeyPatch):
+    """Who came back was shown as the target at any probability: 0.12 was a box on a stranger."""
+    back = [([Someone(0.0, 3.0)], None)]
+    shown = back_again(*back)[0]
+    assert shown.box is not None
+    assert shown.score >= EVEN
+    for odds, has_box in ((EVEN - 0.01, False), (EVEN + 0.01, True)):
+        monkeypatch.setattr(follower, 'bounded', lambda *_, odds=odds: odds)
+        track = back_again(*back)[0]
+        assert (track.box is not None) == has_box
+        assert track.score == pytest.approx(odds if has_box else 0.0)
 
 
 DESK = Box(0, 95, COLS, ROWS - 95)

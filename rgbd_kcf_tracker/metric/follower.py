@@ -268,6 +268,8 @@ class Follower:
                 self.glimpsed = found.seen if score >= EVEN else None
                 self._doubt(SOMEBODY_NEW, found, score)
                 surface.miss(account.scene, dt)
+                if score < EVEN:  # a box on a stranger is worse than none
+                    return self._hidden(frame, dt)
                 return self._tracked(frame, box, score, found.seen.depth, belief)
             if self.person.figure and self.person.gallery.views:
                 self._comeback = Comeback(self.person, account.time)
