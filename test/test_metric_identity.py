@@ -793,6 +793,24 @@ def test_who_comes_back_is_known_again_though_many_were_new_before_him():
     assert rounds[3] == rounds[0]
 
 
+def test_nobody_becomes_one_who_has_just_become_another():
+    """He would have gone with him: who is seen is known under no number then."""
+    watched = Watched()
+    one, two = (watched.crowd.welcome(np.full(2, float(n)), 0.1 * n) for n in (1, 2))
+    account = watched.see(Someone(0.0, 3.0, RED))
+    three = who(account, 0)
+    for later, earlier in ((two, one), (three, two)):
+        later.first_seen = earlier.seen_at + 1.0
+        later.again = 30.0
+        for _ in range(3):
+            later.resembled(earlier.number, 29.0, 1.0, watched.time)
+    account.people = [one, two, three]
+    account.owner = [2]
+    watched.crowd._reunite(account)
+    assert two not in watched.crowd.people, 'the second is the first'
+    assert who(account, 0) in watched.crowd.people
+
+
 def test_two_who_change_places_keep_who_they_are():
     watched = Watched()
     left = right = None

@@ -647,6 +647,9 @@ class Crowd:
             person = account.likest(newcomer, ENOUGH)
             if person is None or person.chosen:  # he is recognised by who follows him
                 continue
+            # Who has become another in this frame is neither any more.
+            if newcomer not in self.people or person not in self.people:
+                continue
             if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
@@ -655,8 +658,7 @@ class Crowd:
                 account.people.index(person) if each == row else each for each in account.owner
             ]
             person.become(newcomer)
-            if newcomer in self.people:
-                self.people.remove(newcomer)
+            self.people.remove(newcomer)
 
     def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
         """Remember who was seen beside whom: they are surely not the same."""
