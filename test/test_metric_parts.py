@@ -666,6 +666,13 @@ def test_evidence_speaks_for_what_fits_and_against_what_does_not():
         assert probability(dataclasses.replace(GOOD, **worse)) < 0.5, worse
 
 
+def test_looks_say_no_more_than_in_what_the_weights_were_fitted_to():
+    """A mug that is carried was lost to something else of its colours, at 5 Hz."""
+    doubtful = dataclasses.replace(GOOD, step=60.0, stride=12.0, assigned=0)
+    chances = [probability(dataclasses.replace(doubtful, look=look)) for look in (2.0, 3.0, 4.0)]
+    assert chances[0] < chances[1] == chances[2]
+
+
 def test_a_rival_counts_only_as_far_as_he_explains_better():
     assert GOOD.behind == 0
     assert dataclasses.replace(GOOD, rival=4.0).behind == 0

@@ -79,6 +79,10 @@ bounds time and memory, and is more than come by in most rooms."""
 SETTLED = 3
 """Frames after which the room is known: as many as tell that a pixel has no reading
 (:data:`~.perceive.room.BLIND_FRAMES`), so that before it anything may seem to be new."""
+OF_TWO = 3.0
+"""Log-odds that a look gives at most to who was chosen and was seen a moment ago, one more once he
+is away: a drawn box may hold two things, and what shows of one of them alone is more like both than
+the other is."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
 SAME = 0.8
@@ -565,9 +569,11 @@ class Crowd:
                 most = None if likeness is None else likeness[column]
                 looks[row, column] = person.gallery.log_odds(sight.view, most)
             odds[row] = person.place_log_odds(places, time)
-            if not person.chosen:
-                odds[row] -= (against + SAME_AGAIN) * away(time - person.seen_at)
-        odds += looks
+            gone = away(time - person.seen_at)
+            if person.chosen:
+                odds[row] += np.minimum(looks[row], OF_TWO + gone)
+            else:
+                odds[row] += looks[row] - (against + SAME_AGAIN) * gone
         return odds, looks, alike
 
     def _joined(self, known: list[Looks]) -> Looks:

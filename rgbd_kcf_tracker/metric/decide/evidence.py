@@ -24,6 +24,10 @@ AWAY = 0.5
 """Seconds after which two thirds of what holds for a target that is followed no longer holds: some
 frames at 5 Hz, as who was missed in one is mostly still there. Fitted with it likewise."""
 
+MOST_ALIKE = 3.0
+"""Log-odds of a look at most in what :data:`WEIGHTS` were fitted to: beyond it they would say more
+than was measured."""
+
 
 @dataclass(frozen=True, slots=True)
 class Said:
@@ -88,7 +92,7 @@ class Evidence:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
         near = math.exp(-self.gone / FADE)
         away = 1.0 - math.exp(-self.gone / AWAY)
-        look = min(max(self.look, -6.0), 5.0)
+        look = min(max(self.look, -6.0), MOST_ALIKE)
         mine = min(max(self.mine, -6.0), 8.0)
         behind = min(self.behind, 8.0)
         log_fraction = math.log(max(self.fraction, 1e-3))

@@ -48,8 +48,9 @@ STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.62, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
-SUREST_SAME, SUREST_OTHER = 3.0, -4.0
-"""Log-odds that looks alone can give: two people may wear the same, and one may turn round."""
+SUREST_SAME, SUREST_OTHER, SUREST_PART = 4.0, -4.0, 3.0
+"""Log-odds that looks alone can give: two people may wear the same, and one may turn round; and the
+most that the least part can say for somebody, as more things look like a small one."""
 ONE_SIDE, ALL_SIDES = 0.7, 4
 """Share of :data:`SUREST_OTHER` that a single view can say, for there is another side to everybody;
 and the further views from which all sides are known."""
@@ -249,9 +250,9 @@ def look_log_odds(alike: float, area: float, views: int = 1) -> float:
     """
     odds = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * math.log2(views))
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
-    enough = TELLING_AREA if odds > 0 else WHOLE_AREA
-    share = PART + (1 - PART) * min(1.0, area / enough)
-    return min(max(odds, least), SUREST_SAME) * share
+    told = min(1.0, area / (TELLING_AREA if odds > 0 else WHOLE_AREA))
+    most = SUREST_PART + (SUREST_SAME - SUREST_PART) * told
+    return min(max(odds, least), most) * (PART + (1 - PART) * told)
 
 
 def height_log_odds(top: float | None, known: float | None) -> float:
