@@ -1003,13 +1003,20 @@ def test_a_view_that_is_rather_one_of_somebody_who_is_away_is_not_learned(away: 
     assert (len(one.gallery.views) > known) == (not away)
 
 
-def met(number: int, place: tuple[float, float], seen: View, learned: View | None, column: int):
+def met(
+    number: int,
+    place: tuple[float, float],
+    seen: View,
+    learned: View | None,
+    column: int,
+    before: float = 0.0,
+):
     """Somebody who is seen now, and who was known by one view long ago."""
     person = Person(number, np.array(place), 0.0)
     if learned is not None:
         person.gallery.learn(learned, 0.0)
     views = slice(column, column + 1) if learned is not None else slice(0, 0)
-    return Followed(person, person.place, seen, column, views)
+    return Followed(person, person.place, seen, column, views, before)
 
 
 @pytest.mark.parametrize(
@@ -1043,6 +1050,41 @@ def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen,
         first = next(each for each in found if each is not None)
         assert {first.first, first.second} == {one.person for one in here}
         assert first.since == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize(
+    ('seen', 'before', 'unproven'),
+    [(RED, -2.0, False), (GREEN, -2.0, True), (GREEN, 5.0, False)],
+)
+def test_a_return_that_its_looks_do_not_bear_out_is_unproven(seen, before, unproven):
+    """By one sight a stranger was taken for who had gone, and both were learned as one for good."""
+    view, known = look(seen, seen), look(RED, RED)
+    one = met(1, (0.0, 3.0), view, known, 0, before)
+    alike = similarity(view, Looks.of([known]))[:, None]
+    watch = MixUps()
+    watch.watch([], np.zeros((0, 0)), 10.0)
+    for time in (20.0, 20.5):  # away for ten seconds, and seen twice
+        watch.watch([one], alike, time)
+        one.person.moved_to(one.place, time)
+        assert not watch.unproven
+    watch.watch([], np.zeros((0, 0)), 26.0)
+    assert watch.unproven == ({1: 10.0} if unproven else {})
+    watch.watch([], np.zeros((0, 0)), 26.1)
+    assert not watch.unproven, 'once'
+
+
+@pytest.mark.parametrize('chosen', [True, False])
+def test_what_was_learned_in_an_unproven_return_is_taken_back(chosen, monkeypatch):
+    watched = Watched()
+    one = watched.walk(-1.0, 0.0, 3.0, RED)
+    views, since = len(one.gallery.views), watched.time
+    one.gallery.learn(look(BLUE, GREY), since + 0.05)
+    one.chosen = chosen
+    monkeypatch.setattr(MixUps, 'watch', lambda self, here, alike, time: None)
+    watched.crowd._mix_ups.unproven = {one.number: since + 0.01}
+    watched.see()
+    # Who was chosen is asked for elsewhere whether he is the one who came back.
+    assert len(one.gallery.views) == views + chosen
 
 
 @pytest.mark.parametrize(('apart', 'mixed_up'), [(0.1, True), (0.9, False)])

@@ -468,6 +468,9 @@ class Crowd:
         sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(self._followed(account), alike, time)
+        for person in self.people:
+            if person.number in self._mix_ups.unproven and not person.chosen:
+                person.gallery.taken_back(self._mix_ups.unproven[person.number])
         if mixed_up is not None:
             other = mixed_up.second
             if other is None:
@@ -522,6 +525,7 @@ class Crowd:
                 account.sights[column].view,
                 column,
                 slice(ends[row] - len(account.people[row].gallery.views), ends[row]),
+                float(account.odds[row, column] - account.looks[row, column]),
             )
             for column, row in enumerate(account.owner)
             if row >= 0
