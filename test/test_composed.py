@@ -125,7 +125,7 @@ def test_who_never_leaves_a_pixel_is_seen_through_where_it_was_farthest():
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not(recording: Path, tmp_path: Path):
-    for name, seeds in (('a', ['1', '2']), ('b', ['2'])):
+    for name, seeds in (('a', ['1', '2']), ('b', ['2-2'])):
         line = [str(recording), *LINE, '--seeds', *seeds, '--out', str(tmp_path / name)]
         assert composed.main(line) == 0
     assert sorted(path.name for path in (tmp_path / 'a').iterdir()) == ['room_x1_1', 'room_x1_2']
@@ -343,6 +343,7 @@ def test_what_cannot_be_composed_is_said(
         ['--together', '0'],
         ['--seeds', '-1'],
         ['--seeds', '1', '1'],
+        ['--seeds', '3-1'],
         ['--fps', '0'],
         ['--intrinsics', '1,2'],
     ):

@@ -40,9 +40,10 @@ from rgbd_kcf_tracker.bench.altered import (
     write_pair,
     write_truth,
 )
-from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.errors import DatasetError, RecordingError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
+from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics, mask_box
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, REGION_ID
@@ -534,7 +535,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = parser_of('composed', __doc__)
     add_reading(parser)
     parser.add_argument(
-        '--seeds', type=int, nargs='+', default=[1, 2, 3], help='a recording for each'
+        '--seeds', nargs='+', default=['1-3'], help='a recording for each: 1-3, or 1 2 3'
     )
     parser.add_argument('--every', type=int, default=1, help='frames of which they have one')
     parser.add_argument('--length', type=int, default=80, help='frames of each')
@@ -571,7 +572,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _check(args: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
-    """End the command where a number makes no recording."""
+    """Read the seeds, and end the command where a number makes no recording."""
     if args.every < 1:
         parser.error('--every must be 1 or more')
     if args.length < SHORTEST:
@@ -580,8 +581,12 @@ def _check(args: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
         parser.error('--absence must be two numbers from 1, the least first')
     if args.together < 1:
         parser.error('--together must be 1 or more')
-    if min(args.seeds) < 0 or len(set(args.seeds)) < len(args.seeds):
-        parser.error('--seeds must be numbers from 0, each of them once')
+    try:
+        args.seeds = [seed for word in args.seeds for seed in parse_seeds(word)]
+    except DatasetError as error:
+        parser.error(f'--seeds: {error}')
+    if len(set(args.seeds)) < len(args.seeds):
+        parser.error('--seeds must name each of them once')
 
 
 if __name__ == '__main__':
