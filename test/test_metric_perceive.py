@@ -106,6 +106,17 @@ def test_the_clock_of_what_is_put_down_is_the_stamp_not_the_frame():
     assert not room.before.any()
 
 
+def test_who_comes_where_somebody_stood_before_has_only_come_now():
+    """After frames that were more than SETTLE apart he was taken for the room at once."""
+    room = known_room(wall())
+    for _ in range(3):
+        see(room, with_thing(), 0.1, None)
+    for _ in range(3):
+        see(room, wall(), 0.1, None)
+    see(room, with_thing(), SETTLE + 0.5, None)
+    assert room.before[THING].all()
+
+
 def test_pixels_that_somebody_left_become_room():
     claimed = NOBODY.copy()
     claimed[THING] = True

@@ -343,7 +343,8 @@ class Room:
         still = self.before & (np.abs(depth - self._still) <= np.float32(0.5) * allowed)
         if somebody is not None:
             still &= ~somebody
-        np.copyto(self._still, depth, where=self.before & ~still)
+        # What comes where something stood before it left has only come now.
+        np.copyto(self._still, depth * self.before, where=~still)
         self._still_for += np.float32(dt)
         self._still_for *= still
         settled = self._still_for > SETTLE
