@@ -615,7 +615,7 @@ def returned(*views: View) -> tuple[Person, Comeback]:
     for view in views:
         person.gallery.learn(view, 0.0)
     person.met.add(7)
-    return person, Comeback(person, 10.0)
+    return person, Comeback(person, 10.0, 0.0)
 
 
 def test_a_return_is_as_likely_as_its_looks_say_by_what_was_known_before():
@@ -623,13 +623,14 @@ def test_a_return_is_as_likely_as_its_looks_say_by_what_was_known_before():
     person, comeback = returned(red)
     assert (comeback.left, comeback.since, comeback.met) == (0.0, 10.0, {7})
     odds = person.gallery.log_odds(red)
-    assert comeback.hear(red, {}, 10.0) == pytest.approx(1 / (1 + np.exp(-odds)))
+    likely = comeback.hear(red, {}, 0.0, 10.0)
+    assert likely.looks == likely.score == pytest.approx(1 / (1 + np.exp(-odds)))
     assert comeback.borne_out == (odds > BORNE_OUT)
     # What is learned of him since does not bear it out, nor does that he goes on to look the same.
     person.gallery.learn(green, 11.0)
     for i in range(20):
-        last = comeback.hear(green, {}, 12.0 + 0.1 * i)
-    assert last < 0.5
+        last = comeback.hear(green, {}, 0.0, 12.0 + 0.1 * i)
+    assert last.looks < 0.5
     assert not comeback.borne_out
     assert comeback.known.log_odds(green) < 0 < person.gallery.log_odds(green)
 
@@ -639,13 +640,23 @@ def test_who_came_back_is_less_likely_the_target_beside_another_who_is_as_like_i
     _, alone = returned(red)
     _, beside = returned(red)
     odds = alone.known.log_odds(red)
-    alone.hear(red, {2: green}, 10.0)
-    assert alone.hear(red, {2: green}, 10.1) == pytest.approx(1 / (1 + np.exp(-odds)))
+    alone.hear(red, {2: green}, 0.0, 10.0)
+    assert alone.hear(red, {2: green}, 0.0, 10.1).looks == pytest.approx(1 / (1 + np.exp(-odds)))
     # Both may be it, or neither.
     expected = np.exp(odds) / (1 + 2 * np.exp(odds))
-    assert beside.hear(red, {2: red}, 10.0) == pytest.approx(expected)
+    assert beside.hear(red, {2: red}, 0.0, 10.0).looks == pytest.approx(expected)
     # Of one who has left nothing more is heard.
-    assert beside.hear(red, {}, 10.1) == pytest.approx(1 / (1 + np.exp(-odds)))
+    assert beside.hear(red, {}, 0.0, 10.1).looks == pytest.approx(1 / (1 + np.exp(-odds)))
+
+
+def test_the_score_of_a_return_counts_how_seldom_anybody_comes_back_and_who_else_is_known():
+    """Once a few sightings bore him out, his looks alone said how likely he was: 0.95 always."""
+    red = look(RED)
+    person, _ = returned(red)
+    odds, against, known = np.exp(person.gallery.log_odds(red)), 1.7, 20.0
+    likely = Comeback(person, 10.0, against).hear(red, {}, known, 10.0)
+    assert likely.looks == pytest.approx(odds / (1 + odds))
+    assert likely.score == pytest.approx(odds / (np.exp(against) + known + odds))
 
 
 # -- everyone together ----------------------------------------------------------------------------
@@ -1672,6 +1683,37 @@ def test_who_is_more_likely_somebody_else_has_no_box(monkeypatch: pytest.MonkeyP
         track = back_again(*back)[0]
         assert (track.box is not None) == has_box
         assert track.score == pytest.approx(odds if has_box else 0.0)
+
+
+@pytest.mark.parametrize('before', [0, 1])
+def test_who_is_known_himself_is_less_likely_the_target(before: int):
+    """He was weighed as the target or somebody new alone, however well he was known."""
+    targets, number, person = followed()
+    for i in range(10):
+        targets.update(picture([], 1.3 + 0.5 * i))
+    for visit in range(before + 1):
+        start = 6.3 + 8.0 * visit
+        for i in range(2 - visit):
+            one = Someone(-0.6 + 0.4 * visit + 0.05 * i, 2.8, RED, GREY)
+            track = targets.update(picture([one], start + 0.1 * i))[number]
+        account = targets.account
+        assert account is not None
+        (row,) = account.owner
+        other = account.people[row]
+        assert other is not person, 'he is not known well enough'
+        known = account.as_others(person, 0)
+        for i in range(8):
+            targets.update(picture([], start + 1.0 + 0.5 * i))
+    assert account.as_others(person, -1) == 0
+    if before:
+        alike = other.resemblance(person.number)
+        assert alike is not None
+        sure = 1 - 1 / (1 + np.exp(account.against - alike))
+        assert known == pytest.approx(np.exp(SUREST_SAME) * sure, rel=0.05)
+        assert track.score < 0.6
+    else:
+        assert known == 0, 'nobody was known before he came'
+        assert track.score > 0.8
 
 
 DESK = Box(0, 95, COLS, ROWS - 95)

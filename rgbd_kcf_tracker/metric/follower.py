@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.identity.comeback import Comeback
+from rgbd_kcf_tracker.metric.identity.comeback import Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
@@ -71,8 +71,8 @@ the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz hal
 sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the disturbed copies
 (docs/metric.md)."""
 DISOWNED = 0.25
-"""Probability that who came back is the target, below which he is somebody else after all: 3 to 1,
-as he was taken once already, on more than this."""
+"""Probability that who came back is the target, by looks alone, below which he is somebody else
+after all: 3 to 1, as he was taken once already, on more than this."""
 IS_ROOM = 0.6
 """Share of a box's middle that shows the room from which it is taken to be no more than that: of a
 thin target's box up to half shows what is behind."""
@@ -261,10 +261,12 @@ class Follower:
             # but a thing that was in view until the camera paused is hardly another one.
             part = self.person.figure and surface.hidden_for > 0
             new = account.owner[index] < 0 if index >= 0 else part
+            against = account.against * away(surface.hidden_for)
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
-                score = bounded(found.probability, account.against * away(surface.hidden_for))
+                others = math.exp(against) + account.as_others(self.person, index)
+                score = bounded(found.probability, math.log(others))
                 self.glimpsed = found.seen if score >= EVEN else None
                 self._doubt(SOMEBODY_NEW, found, score)
                 surface.miss(account.scene, dt)
@@ -272,14 +274,14 @@ class Follower:
                     return self._hidden(frame, dt)
                 return self._tracked(frame, box, score, found.seen.depth, belief)
             if self.person.figure and self.person.gallery.views:
-                self._comeback = Comeback(self.person, account.time)
+                self._comeback = Comeback(self.person, account.time, against)
             surface.resume(found)
         score = found.probability
         if self._comeback is not None:
-            believed = self._believed(self._comeback, account, found.seen)
-            score *= believed
+            likely = self._likely(self._comeback, account, found.seen)
+            score *= likely.score
             self._doubt(KNOWN_BEFORE, found, score)
-            if believed < DISOWNED:
+            if likely.looks < DISOWNED:
                 self._disown(self._comeback, account.time, surface)
                 return self._hidden(frame, dt)
         whole = self._whole(account, found.seen)
@@ -301,8 +303,8 @@ class Follower:
     def _doubt(self, cue: str, found: Candidate, score: float) -> None:
         self.doubts[cue] = logit(score) - logit(found.probability)
 
-    def _believed(self, comeback: Comeback, account: Account, seen: Silhouette) -> float:
-        """Probability that a returned target is the target, by what was known before it left."""
+    def _likely(self, comeback: Comeback, account: Account, seen: Silhouette) -> Likely:
+        """Whether a returned target is the target, by what was known before it left."""
         assert self.person is not None
         mine = account.sight_of(seen)
         others = {
@@ -313,7 +315,8 @@ class Follower:
             and account.people[owner] is not self.person
             and account.people[owner].number not in comeback.met
         }
-        return comeback.hear(account.look(seen), others, account.time)
+        known = account.as_others(self.person, mine)
+        return comeback.hear(account.look(seen), others, known, account.time)
 
     def _withdraw(self) -> None:
         """What was learned of a return that was not borne out is not of the target."""

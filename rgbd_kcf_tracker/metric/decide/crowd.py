@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     Compared,
     Looks,
     View,
+    similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
@@ -261,6 +262,36 @@ class Account:
                 elif other.number in person.met:
                     rival = max(rival, float(self.odds[row, index]))
         return Claim(look, mine, rival, assigned, self._room_beside(person, seen))
+
+    def as_others(self, person: Person, index: int) -> float:
+        """Odds that a sight is one of the others who are known, by its looks; 0 for no sight.
+
+        As :attr:`against` is, they are against any one of those who are away coming back: whoever
+        is known comes back as seldom as the person does.
+        """
+        total = 0.0
+        for row, other in enumerate(self.people[: len(self.looks)] if index >= 0 else []):
+            if other is person or other.gallery.looks is None:
+                continue
+            look: float | None = float(self.looks[row, index])
+            if row in self.owner:
+                if row != self.owner[index]:  # he is elsewhere
+                    continue
+                # That somebody looks as he has since he came tells nothing of who he is.
+                view = self.sights[index].view
+                alike = similarity(view, other.gallery.looks)
+                came = self.time if self.was_away(other) else other.came
+                look = other.gallery.log_odds_before(came, view, alike)
+            if look is not None:
+                total += math.exp(look) * (1.0 - self._is_same(other, person))
+        return total
+
+    def _is_same(self, other: Person, person: Person) -> float:
+        """Probability that another who is known is a person who had gone, 0 to 1."""
+        alike = other.resemblance(person.number)
+        if alike is None or other.chosen or other.number in person.met:
+            return 0.0
+        return 1.0 / (1.0 + math.exp(self.against - alike))
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""
@@ -725,6 +756,8 @@ class Crowd:
         # Who was missed only once may have been away, too: how surely, the time says.
         if person.misses and gone > REUNION:
             self._arrivals.returned(gone)
+        if account.was_away(person):
+            person.came = account.time
         if gone > 0:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0

@@ -160,7 +160,7 @@ WHERE_IT_STOOD = 'where it stood'
 OTHER_PLACES = 'other places'
 """What the likeliest candidate loses to the others; the regression does not know of them."""
 SOMEBODY_NEW = 'somebody new'
-"""What it loses while it may be somebody who was never seen before."""
+"""What it loses while it may be somebody who was never seen before, or another who was."""
 KNOWN_BEFORE = 'known before'
 """What it loses after an absence to what the target was known by before, see
 :class:`~rgbd_kcf_tracker.metric.identity.comeback.Comeback`."""
@@ -179,8 +179,8 @@ CUE_WORDS = {
     'to begin with': 'where all other cues say nothing',
     WHERE_IT_STOOD: 'a thing that stood still is there again when the camera looks back',
     OTHER_PLACES: 'the target is at one place only: what the likeliest loses to the others',
-    SOMEBODY_NEW: 'who comes may be somebody new instead of the target that comes back',
-    KNOWN_BEFORE: 'after an absence: how alike it is, and others in view are, to the target before',
+    SOMEBODY_NEW: 'who comes may be somebody new, or another who is known, instead of the target',
+    KNOWN_BEFORE: 'after an absence: how alike it is to the target before, and to others as well',
 }
 """What each of :data:`CUES` says, and of those that only the likeliest has."""
 

@@ -33,12 +33,26 @@ class _Heard:
     time: float = -math.inf
 
 
+@dataclass(frozen=True, slots=True)
+class Likely:
+    """How likely who came back is the target, 0 to 1.
+
+    Attributes:
+        looks: by his looks, beside all in view.
+        score: beside all others who are known, and anybody new, as well.
+    """
+
+    looks: float
+    score: float
+
+
 class Comeback:
     """One return of a target, which may be somebody else.
 
     Args:
         person: the target, as it was known before.
         time: seconds of the return.
+        against: log-odds against anybody coming back just then.
 
     Attributes:
         since: seconds of the return.
@@ -47,18 +61,21 @@ class Comeback:
         met: numbers of those who had been seen beside the target.
     """
 
-    def __init__(self, person: Person, time: float) -> None:
+    def __init__(self, person: Person, time: float, against: float) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
+        self._new = math.exp(against)
         self._mine, self._others = _Heard(), dict[int, _Heard]()
 
-    def hear(self, view: View, others: dict[int, View], time: float) -> float:
-        """Take a frame, and give the probability that who came back is the target, 0 to 1.
+    def hear(self, view: View, others: dict[int, View], known: float, time: float) -> Likely:
+        """Take a frame, and say whether who came back is the target.
 
         Args:
             view: of who came back.
             others: of all in view who may be the target as well, by their numbers. Of these one is
                 looked at in each frame, who was looked at longest ago.
+            known: odds that he is somebody else who is known, see
+                :meth:`~rgbd_kcf_tracker.metric.decide.crowd.Account.as_others`.
             time: seconds.
         """
         self._look(self._mine, view, time)
@@ -70,7 +87,8 @@ class Comeback:
         mine = math.exp(self.odds)
         rivals = (self._others[number].tally.mean or 0.0 for number in others)
         # Each may be the target, or none of them.
-        return mine / (1.0 + mine + sum(math.exp(odds) for odds in rivals if odds > 0))
+        either = mine + sum(math.exp(odds) for odds in rivals if odds > 0)
+        return Likely(mine / (1.0 + either), mine / (self._new + known + either))
 
     def _look(self, heard: _Heard, view: View, time: float) -> None:
         if time - heard.time < AGAIN:

@@ -67,6 +67,7 @@ class Person:
 
     Attributes:
         seen_at: seconds, the last sight.
+        came: seconds, the first sight since it was last away.
         sightings: how often it was seen.
         misses: frames since then that showed nothing of it.
         mobile: whether it was seen before a room that is known: what stands still is not it.
@@ -87,7 +88,7 @@ class Person:
         self.number, self.chosen = number, chosen
         self.place, self.velocity = place.copy(), np.zeros(2)
         self.first_place, self.travelled = place.copy(), 0.0
-        self.seen_at = self.first_seen = time
+        self.seen_at = self.first_seen = self.came = time
         self.sightings, self.misses = 1, 0
         self.upright = self.mobile = self.entered = self.figure = False
         self.hidden = True
@@ -191,7 +192,7 @@ class Person:
         if newcomer.seen_at > self.seen_at:
             self.place, self.velocity = newcomer.place, newcomer.velocity
             self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
-            self.hidden = newcomer.hidden
+            self.hidden, self.came = newcomer.hidden, newcomer.came
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright
@@ -210,6 +211,7 @@ class Person:
         self.place, other.place = other.place, self.place
         self.velocity, other.velocity = other.velocity, self.velocity
         self.seen_at, other.seen_at = other.seen_at, self.seen_at
+        self.came, other.came = other.came, self.came
         self.misses, other.misses = other.misses, self.misses
         self.last, other.last = other.last, self.last
         self.hidden, other.hidden = other.hidden, self.hidden
