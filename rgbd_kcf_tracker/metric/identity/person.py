@@ -32,6 +32,9 @@ more, as cameras are late. At 0.6 of that second places fell short of where walk
 SLOW, STANDS, SWAYING = 0.25, 0.7, 0.4
 """Metres a second below which a person stands, the probability that he goes on standing, and metres
 a second by which his next place is unknown if he does."""
+TURNED = 0.5
+"""Probability that who was missed has stopped or turned round meanwhile, rather than gone on: even,
+as nothing was seen of it. Of a man who turned round behind another somebody new was made."""
 VELOCITY_TIME = 0.3
 """Seconds after which a velocity is two thirds of what the sightings since then tell: two frames at
 5 Hz, since one alone may be off by as much as a step."""
@@ -111,18 +114,23 @@ class Person:
     def place_log_odds(self, places: FloatArray, time: float) -> FloatArray:
         """Log-odds, ``(n,)``, of being at ``places`` ``(n, 2)`` rather than anybody else."""
         gone = time - self.seen_at
-        off = np.square(places - self.expected(time)).sum(axis=1)
+        off = _off(places, self.expected(time))
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ANYWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
-        walks = (1 - anywhere) * _density(off, variance) * ROOM_AREA + anywhere
+        walks = _density(off, variance)
+        if self.misses:
+            variance = PLACE_SIGMA**2 + (WALKING * min(gone, FORGET)) ** 2
+            turned = _density(_off(places, self.place), variance)
+            walks = (1 - TURNED) * walks + TURNED * turned
+        walks = (1 - anywhere) * walks * ROOM_AREA + anywhere
         stands = self._stands(gone)
         if stands == 0:
             odds: FloatArray = np.log(walks)
             return odds
-        still = np.square(places - self.place).sum(axis=1)
         swayed = PLACE_SIGMA**2 + (SWAYING * min(gone, COAST)) ** 2
-        odds = np.log(stands * _density(still, swayed) * ROOM_AREA + (1 - stands) * walks)
+        still = _density(_off(places, self.place), swayed)
+        odds = np.log(stands * still * ROOM_AREA + (1 - stands) * walks)
         return odds
 
     def _stands(self, gone: float) -> float:
@@ -254,6 +262,12 @@ class Person:
         self.misses = 0
         self.sightings += 1
         self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
+
+
+def _off(places: FloatArray, place: FloatArray) -> FloatArray:
+    """Squared distances of ``places`` ``(n, 2)`` from one, ``(n,)``."""
+    off: FloatArray = np.square(places - place).sum(axis=1)
+    return off
 
 
 def _density(squared: FloatArray, variance: float) -> FloatArray:
