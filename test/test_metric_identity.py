@@ -309,6 +309,19 @@ def test_who_stands_is_where_he_stood_rather_than_beside_it():
     assert margins[1] > margins[0] + 0.3
 
 
+@pytest.mark.parametrize('missed', [False, True])
+def test_who_was_hidden_may_have_turned_round_meanwhile(missed: bool):
+    """He was expected farther on alone, so that somebody new came out where he had gone."""
+    one = Person(1, np.array([0.0, 3.0]), 0.0)
+    for i in range(1, 6):
+        one.moved_to(np.array([0.28 * i, 3.0]), 0.2 * i)
+    if missed:
+        one.missed(np.zeros((ROWS, COLS), np.float32))
+    ahead, back = one.place_log_odds(np.array([one.expected(1.8), [1.4, 3.0]]), 1.8)
+    assert (ahead - back < 1) == missed
+    assert (back > 0) == missed, 'he rather than anybody'
+
+
 def test_the_place_says_less_the_longer_somebody_is_away():
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     places = np.array([[0.1, 3.0], [2.5, 3.0]])
@@ -1714,6 +1727,28 @@ def test_who_is_known_himself_is_less_likely_the_target(before: int):
     else:
         assert known == 0, 'nobody was known before he came'
         assert track.score > 0.8
+
+
+@pytest.mark.parametrize('trousers', [BLACK, GREY])
+def test_the_score_of_whom_nobody_chose_says_how_surely_he_is_who_went(
+    trousers: tuple[int, int, int],
+):
+    """A tenth of a second after he had come back it was 1.0, in whatever trousers."""
+    targets = MetricTargets(MetricParameters())
+    targets.everyone = True
+    for i in range(6):
+        targets.update(picture([], 0.1 * (i + 1)))
+    for i in range(10):
+        first = targets.update(picture([Someone(-0.6 + 0.05 * i, 3.0)], 0.7 + 0.1 * i))
+    for i in range(12):
+        targets.update(picture([], 1.7 + 0.5 * i))
+    for i in range(24):
+        one = Someone(-0.6 + 0.05 * i, 2.8, RED, trousers)
+        tracks = targets.update(picture([one], 8.0 + 0.1 * i))
+        assert list(tracks) == list(first)
+        (track,) = tracks.values()
+        assert track.box is not None
+        assert (track.score > 0.85) == (trousers == BLACK)
 
 
 DESK = Box(0, 95, COLS, ROWS - 95)

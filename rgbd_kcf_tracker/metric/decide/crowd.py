@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -152,6 +152,7 @@ class Account:
         looks: ``(m, n)`` the part of the look and the height in them.
         settled: whether the room has been seen for long enough to tell what stands before it.
         against: log-odds against any one of those who are away coming back just now.
+        sure: how likely those who came back are whom they were taken for, 0 to 1, by their numbers.
         owner: for each sight the index among ``people``, or -1.
         verdict: the same as the frame explains itself best, who was chosen and is away included.
     """
@@ -164,6 +165,7 @@ class Account:
     looks: FloatArray
     settled: bool
     against: float
+    sure: Mapping[int, float]
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
     _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
@@ -203,7 +205,8 @@ class Account:
         odds = self.odds[:, column]
         others = np.delete(odds, row)
         total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
-        return float(1 / (1 + total * np.exp(-min(odds[row], 30))))
+        here = float(1 / (1 + total * np.exp(-min(odds[row], 30))))
+        return here * self.sure.get(self.people[row].number, 1.0)
 
     def sight_of(self, seen: Silhouette) -> int:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
@@ -403,6 +406,8 @@ class Crowd:
         self._axes = CAMERA_AXES
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
+        self._comebacks: dict[int, Comeback] = {}
+        self._sure: dict[int, float] = {}
         self._known: list[Looks] = []
         self._everyone: Looks | None = None
 
@@ -507,6 +512,8 @@ class Crowd:
             if other is None:
                 other = self.welcome(mixed_up.first.place, mixed_up.since)
             mixed_up.first.exchange(other, mixed_up.since)
+            for person in (mixed_up.first, other):
+                self._comebacks.pop(person.number, None)
             account, _ = self._explained(scene, sights, time)
         for column, row in enumerate(account.owner):
             if row >= 0:
@@ -530,6 +537,7 @@ class Crowd:
             looks,
             self._frames > SETTLED,
             against,
+            self._sure,
         )
         account.verdict = _assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
@@ -676,6 +684,21 @@ class Crowd:
                 person.missed(account.scene.view.depth)
         self._introduce(account, {n: None if n in unsure else s for n, s in targets.items()})
         self._reunite(account)
+        self._bear_out(account)
+
+    def _bear_out(self, account: Account) -> None:
+        """Hear how those who came back, and whom nobody chose, look by what was known before."""
+        here = {person.number for person in self.people if not person.chosen}
+        self._comebacks = {n: each for n, each in self._comebacks.items() if n in here}
+        sure = {number: self._sure.get(number, 1.0) for number in self._comebacks}
+        for column, row in enumerate(account.owner):
+            number = account.people[row].number if row >= 0 else -1
+            if number in self._comebacks:
+                view = account.sights[column].view
+                known = account.as_others(account.people[row], column)
+                likely = self._comebacks[number].hear(view, {}, known, account.time)
+                sure[number] = likely.score
+        self._sure = sure
 
     def _reunite(self, account: Account) -> None:
         """Give newcomers the number of whom they have turned out to be.
@@ -694,6 +717,7 @@ class Crowd:
             if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
+            self._comebacks[person.number] = Comeback(person, newcomer.first_seen, account.against)
             row = account.people.index(newcomer)
             account.owner = [
                 account.people.index(person) if each == row else each for each in account.owner
@@ -758,6 +782,8 @@ class Crowd:
             self._arrivals.returned(gone)
         if account.was_away(person):
             person.came = account.time
+            if person.gallery.views:
+                self._comebacks[person.number] = Comeback(person, person.came, account.against)
         if gone > 0:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0
