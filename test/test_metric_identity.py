@@ -52,9 +52,8 @@ from rgbd_kcf_tracker.metric.decide.crowd import (
     Crowd,
     Sight,
 )
-from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
-from rgbd_kcf_tracker.metric.follower import EVEN
-from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, Comeback
+from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
+from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
     MOST_VIEWS,
@@ -315,8 +314,10 @@ def test_who_was_hidden_may_have_turned_round_meanwhile(missed: bool):
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     for i in range(1, 6):
         one.moved_to(np.array([0.28 * i, 3.0]), 0.2 * i)
-    if missed:
-        one.missed(np.zeros((ROWS, COLS), np.float32))
+    if missed:  # behind somebody who is nearer than he was
+        sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+        one.last = sight
+        one.missed(np.full((ROWS, COLS), sight.depth - 1.0, np.float32))
     ahead, back = one.place_log_odds(np.array([one.expected(1.8), [1.4, 3.0]]), 1.8)
     assert (ahead - back < 1) == missed
     assert (back > 0) == missed, 'he rather than anybody'
@@ -660,6 +661,23 @@ def test_who_came_back_is_less_likely_the_target_beside_another_who_is_as_like_i
     assert beside.hear(red, {2: red}, 0.0, 10.0).looks == pytest.approx(expected)
     # Of one who has left nothing more is heard.
     assert beside.hear(red, {}, 0.0, 10.1).looks == pytest.approx(1 / (1 + np.exp(-odds)))
+
+
+@pytest.mark.parametrize(
+    ('seen', 'against', 'stays'), [(RED, 0, True), (GREEN, 0, False), (RED, 6, False)]
+)
+def test_of_who_is_rather_somebody_else_what_was_learned_since_is_taken_back_once(
+    seen, against: float, stays: bool
+):
+    person, _ = returned(look(RED))
+    comeback = Comeback(person, 10.0, against)
+    person.gallery.learn(look(BLUE), 10.5)
+    comeback.hear(look(seen), {}, 0.0, 11.0)
+    comeback.settle(person)
+    assert len(person.gallery.views) == 1 + stays
+    person.gallery.learn(look(GREY), 12.0)
+    comeback.settle(person)
+    assert len(person.gallery.views) == 2 + stays
 
 
 def test_the_score_of_a_return_counts_how_seldom_anybody_comes_back_and_who_else_is_known():
@@ -1033,14 +1051,13 @@ def met(
     seen: View,
     learned: View | None,
     column: int,
-    before: float = 0.0,
 ):
     """Somebody who is seen now, and who was known by one view long ago."""
     person = Person(number, np.array(place), 0.0)
     if learned is not None:
         person.gallery.learn(learned, 0.0)
     views = slice(column, column + 1) if learned is not None else slice(0, 0)
-    return Followed(person, person.place, seen, column, views, before)
+    return Followed(person, person.place, seen, column, views)
 
 
 @pytest.mark.parametrize(
@@ -1076,37 +1093,20 @@ def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen,
         assert first.since == pytest.approx(9.0)
 
 
-@pytest.mark.parametrize(
-    ('seen', 'before', 'unproven'),
-    [(RED, -2.0, False), (GREEN, -2.0, True), (GREEN, 5.0, False)],
-)
-def test_a_return_that_its_looks_do_not_bear_out_is_unproven(seen, before, unproven):
-    """By one sight a stranger was taken for who had gone, and both were learned as one for good."""
-    view, known = look(seen, seen), look(RED, RED)
-    one = met(1, (0.0, 3.0), view, known, 0, before)
-    alike = similarity(view, Looks.of([known]))[:, None]
-    watch = MixUps()
-    watch.watch([], np.zeros((0, 0)), 10.0)
-    for time in (20.0, 20.5):  # away for ten seconds, and seen twice
-        watch.watch([one], alike, time)
-        one.person.moved_to(one.place, time)
-        assert not watch.unproven
-    watch.watch([], np.zeros((0, 0)), 26.0)
-    assert watch.unproven == ({1: 10.0} if unproven else {})
-    watch.watch([], np.zeros((0, 0)), 26.1)
-    assert not watch.unproven, 'once'
-
-
 @pytest.mark.parametrize('chosen', [True, False])
-def test_what_was_learned_in_an_unproven_return_is_taken_back(chosen, monkeypatch):
+def test_what_was_learned_in_a_return_that_is_not_borne_out_is_taken_back_after_a_while(chosen):
+    """By one sight a stranger was taken for who had gone, and both were learned as one for good."""
     watched = Watched()
     one = watched.walk(-1.0, 0.0, 3.0, RED)
-    views, since = len(one.gallery.views), watched.time
-    one.gallery.learn(look(BLUE, GREY), since + 0.05)
+    views = len(one.gallery.views)
+    watched.crowd._came_back(one, watched.time, against=10.0)
+    one.gallery.learn(look(BLUE, GREY), watched.time + 0.05)
     one.chosen = chosen
-    monkeypatch.setattr(MixUps, 'watch', lambda self, here, alike, time: None)
-    watched.crowd._mix_ups.unproven = {one.number: since + 0.01}
-    watched.see()
+    account = watched.see(Someone(0.05, 3.0))
+    assert who(account, 0) is one
+    assert len(one.gallery.views) == views + 1, 'more of him may show'
+    for _ in range(2):
+        watched.see(dt=AFTER / 2)
     # Who was chosen is asked for elsewhere whether he is the one who came back.
     assert len(one.gallery.views) == views + chosen
 

@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
-from rgbd_kcf_tracker.metric.identity.comeback import Comeback, Likely
+from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
@@ -45,8 +45,6 @@ cells of the filter are a tenth of it, and depth is that of any of its sides."""
 ABOUT = 1.5
 """Times its size that the surroundings of a box are in which depth is read of what has none: a
 quarter of it on each side, where what holds or carries it shows."""
-EVEN = 0.5
-"""Probability from which a box is shown as the target's alone: rather his than not."""
 LEARNED = 0.6
 """Score from which a target's look is learned from where it was found: below, it may well be
 somebody else, who would be the target from then on."""

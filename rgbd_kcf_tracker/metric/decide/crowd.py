@@ -16,7 +16,7 @@ from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrival, Arrivals, away, is_new
-from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -407,7 +407,6 @@ class Crowd:
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
         self._comebacks: dict[int, Comeback] = {}
-        self._sure: dict[int, float] = {}
         self._known: list[Looks] = []
         self._everyone: Looks | None = None
 
@@ -504,9 +503,6 @@ class Crowd:
         sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(self._followed(account), alike, time)
-        for person in self.people:
-            if person.number in self._mix_ups.unproven and not person.chosen:
-                person.gallery.taken_back(self._mix_ups.unproven[person.number])
         if mixed_up is not None:
             other = mixed_up.second
             if other is None:
@@ -537,7 +533,7 @@ class Crowd:
             looks,
             self._frames > SETTLED,
             against,
-            self._sure,
+            {n: each.likely.score for n, each in self._comebacks.items() if each.likely},
         )
         account.verdict = _assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
@@ -564,7 +560,6 @@ class Crowd:
                 account.sights[column].view,
                 column,
                 slice(ends[row] - len(account.people[row].gallery.views), ends[row]),
-                float(account.odds[row, column] - account.looks[row, column]),
             )
             for column, row in enumerate(account.owner)
             if row >= 0
@@ -687,18 +682,27 @@ class Crowd:
         self._bear_out(account)
 
     def _bear_out(self, account: Account) -> None:
-        """Hear how those who came back, and whom nobody chose, look by what was known before."""
-        here = {person.number for person in self.people if not person.chosen}
+        """Hear how those who came back, and whom nobody chose, look by what was known before.
+
+        What was learned of them since is taken back where some seconds do not bear it out.
+        """
+        owners = {account.people[row]: n for n, row in enumerate(account.owner) if row >= 0}
+        here = {p.number: p for p in self.people if not p.chosen}
         self._comebacks = {n: each for n, each in self._comebacks.items() if n in here}
-        sure = {number: self._sure.get(number, 1.0) for number in self._comebacks}
-        for column, row in enumerate(account.owner):
-            number = account.people[row].number if row >= 0 else -1
-            if number in self._comebacks:
-                view = account.sights[column].view
-                known = account.as_others(account.people[row], column)
-                likely = self._comebacks[number].hear(view, {}, known, account.time)
-                sure[number] = likely.score
-        self._sure = sure
+        for number, comeback in self._comebacks.items():
+            person = here[number]
+            if person in owners:
+                view = account.sights[owners[person]].view
+                known = account.as_others(person, owners[person])
+                comeback.hear(view, {}, known, account.time)
+            if account.time - comeback.since >= AFTER:
+                comeback.settle(person)
+
+    def _came_back(self, person: Person, since: float, against: float) -> None:
+        """Somebody whom nobody chose came back, at ``since`` seconds."""
+        if person.number in self._comebacks:
+            self._comebacks[person.number].settle(person)
+        self._comebacks[person.number] = Comeback(person, since, against)
 
     def _reunite(self, account: Account) -> None:
         """Give newcomers the number of whom they have turned out to be.
@@ -783,7 +787,7 @@ class Crowd:
         if account.was_away(person):
             person.came = account.time
             if person.gallery.views:
-                self._comebacks[person.number] = Comeback(person, person.came, account.against)
+                self._came_back(person, person.came, account.against)
         if gone > 0:
             person.moved_to(place, account.time)
         person.last, person.figure = seen, index >= 0

@@ -57,7 +57,6 @@ class Followed(NamedTuple):
         view: his look.
         column: of his sight.
         views: where the views of his gallery are among those of all.
-        before: log-odds that it is he, before it is asked how he looks.
     """
 
     person: Person
@@ -65,7 +64,6 @@ class Followed(NamedTuple):
     view: View
     column: int
     views: slice
-    before: float
 
 
 class MixUp(NamedTuple):
@@ -86,8 +84,7 @@ class _Doubt:
     Attributes:
         since: seconds, from when on what was learned may be of another.
         last: seconds, when places last said little.
-        against: log-odds against it by the places of then, at the least; of who came back, by how
-            often anybody does as well.
+        against: log-odds against it by the places of then, at the least.
         said: log-odds of it by the looks.
     """
 
@@ -96,23 +93,11 @@ class _Doubt:
     against: float = math.inf
     said: Tally = field(default_factory=Tally)
 
-    @property
-    def likely(self) -> bool:
-        """Whether the looks, if there were any, say so by more than what was against it."""
-        mean = self.said.mean
-        return mean is not None and mean > self.against
-
 
 class MixUps:
-    """Watches all who came near each other or were lost for a moment.
-
-    Attributes:
-        unproven: numbers of those whose looks since they came back, some seconds ago, do not bear
-            it out, and since when, in seconds: what was learned of them since may be of another.
-    """
+    """Watches all who came near each other or were lost for a moment."""
 
     def __init__(self) -> None:
-        self.unproven: dict[int, float] = {}
         self._meetings: dict[tuple[int, int], _Doubt] = {}
         self._returns: dict[int, _Doubt] = {}
         self._time, self._counts = 0.0, 1.0
@@ -129,9 +114,7 @@ class MixUps:
             Whose number went over to another, the first of them that is found.
         """
         self._meetings = {k: d for k, d in self._meetings.items() if time - d.last < AFTER}
-        over = {k: d for k, d in self._returns.items() if time - d.last >= AFTER}
-        self.unproven = {k: d.since for k, d in over.items() if d.likely}
-        self._returns = {k: d for k, d in self._returns.items() if k not in over}
+        self._returns = {k: d for k, d in self._returns.items() if time - d.last < AFTER}
         self._counts = min(1.0, (time - self._time) / SIGHTING)
         found = self._returned(here, alike, time) or self._met(here, alike, time)
         self._time = time
@@ -144,7 +127,7 @@ class MixUps:
             if one.person.chosen:  # he is recognised by who follows him
                 continue
             if one.person.seen_at < self._time:
-                self._returns[number] = _Doubt(self._time, time, one.before)
+                self._returns[number] = _Doubt(self._time, time)
             doubt = self._returns.get(number)
             if doubt is None:
                 continue

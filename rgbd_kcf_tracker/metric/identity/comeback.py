@@ -21,6 +21,9 @@ BORNE_OUT = 2.0
 """Log-odds (seven to one) from which what was learned since the return is of the target and stays,
 as much as it takes to say the contrary
 (:data:`~rgbd_kcf_tracker.metric.decide.mix_ups.MIXED_UP`)."""
+EVEN = 0.5
+"""Probability below which who came back is rather somebody else than the target: no box is shown of
+him, and what was learned of him does not stay."""
 AGAIN = 0.15
 """Seconds after which somebody is looked at again: nobody looks otherwise before."""
 
@@ -59,12 +62,14 @@ class Comeback:
         left: seconds of the last sight before it.
         known: the views and heights from before.
         met: numbers of those who had been seen beside the target.
+        likely: what was heard last; None before anything was.
     """
 
     def __init__(self, person: Person, time: float, against: float) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
-        self._new = math.exp(against)
+        self.likely: Likely | None = None
+        self._new, self._settled = math.exp(against), False
         self._mine, self._others = _Heard(), dict[int, _Heard]()
 
     def hear(self, view: View, others: dict[int, View], known: float, time: float) -> Likely:
@@ -88,7 +93,14 @@ class Comeback:
         rivals = (self._others[number].tally.mean or 0.0 for number in others)
         # Each may be the target, or none of them.
         either = mine + sum(math.exp(odds) for odds in rivals if odds > 0)
-        return Likely(mine / (1.0 + either), mine / (self._new + known + either))
+        self.likely = Likely(mine / (1.0 + either), mine / (self._new + known + either))
+        return self.likely
+
+    def settle(self, person: Person) -> None:
+        """Take back what was learned of somebody since, once, where he is rather somebody else."""
+        if not self._settled and self.likely is not None and self.likely.score < EVEN:
+            person.gallery.taken_back(self.since)
+        self._settled = True
 
     def _look(self, heard: _Heard, view: View, time: float) -> None:
         if time - heard.time < AGAIN:

@@ -119,7 +119,7 @@ class Person:
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ANYWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
         walks = _density(off, variance)
-        if self.misses:
+        if self.misses and self.hidden:
             variance = PLACE_SIGMA**2 + (WALKING * min(gone, FORGET)) ** 2
             turned = _density(_off(places, self.place), variance)
             walks = (1 - TURNED) * walks + TURNED * turned
