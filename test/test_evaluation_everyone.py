@@ -79,6 +79,17 @@ def test_an_id_that_goes_over_to_somebody_else_is_on_a_stranger():
     assert result.switches == 1
 
 
+def test_of_boxes_that_are_sure_those_on_the_person_of_their_id_are_told():
+    truth = rows(*walk(1, A, range(4)), *walk(2, B, range(8)))
+    # Id 1 is on B from frame 4 on, and says in two of four frames that it is not sure.
+    scores = [0.95] * 6 + [0.5] * 2 + [0.9] * 4
+    entries = (*walk(1, A, range(4)), *walk(1, B, range(4, 8)), *walk(2, B, range(4)))
+    result = score(truth, rows(*entries, scores=scores))
+    assert result.sure == pytest.approx(8 / 10)
+    assert result.strangers == pytest.approx(4 / 12)
+    assert math.isnan(score(truth, rows(*entries, scores=[0.8] * 12)).sure)
+
+
 def test_a_box_that_still_touches_its_person_is_on_nobody_else():
     truth = rows(*walk(1, A, range(3)))
     near, off = (0, 5, 10, 10), A_TENTH  # IoU 1/3 and 1/19

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
+from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, mean
 from rgbd_kcf_tracker.evaluation.score_tables import Column, scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
@@ -17,6 +18,7 @@ COLUMNS: tuple[Column, ...] = (
     Column('idf1', 'IDF1 %'),
     Column('mota', 'MOTA %'),
     Column('strangers', 'strangers %'),
+    Column('sure', f'of {SURE:g} and more: on the target %'),
     Column('returns', 'returns %'),
     Column('det_a', 'DetA %'),
     Column('ass_a', 'AssA %'),
@@ -53,7 +55,8 @@ def overview(results: Sequence[EveryoneResult]) -> Table:
         note='Shares are means over recordings, each counting once; counts are sums. IDF1, MOTA '
         'and counts at IoU 0.5; HOTA over IoU 0.05 to 0.95. People of whom little shows are '
         'neither hit nor miss. Strangers: of all boxes, those on something else than the person '
-        'that their id was first on. Returns: of the times a person was back for five frames or '
+        f'that their id was first on; of boxes with a score of {SURE:g} and more, those on that '
+        'person. Returns: of the times a person was back for five frames or '
         'more, those in which the id from before is on them again.',
     )
 

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU
 from rgbd_kcf_tracker.evaluation.metrics.presence import (
     HIT_SHARE,
@@ -59,6 +60,8 @@ class Everyone:
         strangers: of all boxes, the share on something else (IoU < 0.1, or nobody there) than the
             person that their id was first on; an id that never was on anybody has all of its boxes
             on something else.
+        sure: of the boxes with a score of :data:`~.calibration.SURE` and more, the share that is
+            not on something else.
         returns: of the times a person was back for five frames or more, the share in which at least
             half of the frames from the third on were hit by the id that they had before.
         recall: of the people who count, the share that has a box on it.
@@ -76,6 +79,7 @@ class Everyone:
     idf1: float
     mota: float
     strangers: float
+    sure: float
     returns: float
     recall: float
     precision: float
@@ -112,13 +116,16 @@ def score(truth: Sightings, tracks: Sightings, bodies: FloatArray | None = None)
     identity = _identity(moments, people, boxes, sizes)
     hota, det_a, ass_a = _hota(moments, people, boxes, sizes)
     hits = int((clear.matched >= 0).sum())
+    own, scores = _on_own(moments, agreement, clear)
+    sure = scores >= SURE
     return Everyone(
         hota=hota,
         det_a=det_a,
         ass_a=ass_a,
         idf1=_ratio(2 * identity, n + m),
         mota=_ratio(n - (n - hits) - (m - hits) - clear.switches, n),
-        strangers=_strangers(moments, agreement, clear),
+        strangers=_ratio(int(np.count_nonzero(~own)), m),
+        sure=_ratio(int(np.count_nonzero(own & sure)), int(np.count_nonzero(sure))),
         returns=_returns(truth, clear),
         recall=_ratio(hits, n),
         precision=_ratio(hits, m),
@@ -271,25 +278,27 @@ def _hota(
     return float(hota), float(det_a), float(ass_a)
 
 
-def _strangers(moments: list[_Moment], agreement: _Agreement, clear: _Clear) -> float:
-    """Share of boxes on something else than the person that their id was first on."""
+def _on_own(
+    moments: list[_Moment], agreement: _Agreement, clear: _Clear
+) -> tuple[Mask, FloatArray]:
+    """Of each box whether it is on the person that its id was first on, and its score."""
     truth, tracks = agreement.truth, agreement.tracks
     where = {
         (int(f), int(i)): row
         for row, (f, i) in enumerate(zip(truth.frames, truth.ids, strict=True))
         if i != REGION_ID
     }
-    wrong = total = 0
+    found, scores = [], []
     for moment in moments:
-        total += len(moment.tracks)
         for row in moment.tracks:
             person = clear.first_person.get(int(tracks.ids[row]))
             own = None if person is None else where.get((moment.frame, person))
-            near = own is not None and (
-                agreement(np.array([own]), np.array([row]))[0, 0] >= STRANGER_IOU
+            found.append(
+                own is not None
+                and agreement(np.array([own]), np.array([row]))[0, 0] >= STRANGER_IOU
             )
-            wrong += not near
-    return _ratio(wrong, total)
+            scores.append(tracks.scores[row])
+    return np.array(found, np.bool_), np.array(scores, np.float64)
 
 
 def _returns(truth: Sightings, clear: _Clear) -> float:
