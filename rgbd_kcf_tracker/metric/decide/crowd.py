@@ -786,7 +786,7 @@ class Crowd:
             self._arrivals.returned(gone)
         if account.was_away(person):
             person.came = account.time
-            if person.gallery.views:
+            if person.gallery.views and not person.chosen:
                 self._came_back(person, person.came, account.against)
         if gone > 0:
             person.moved_to(place, account.time)

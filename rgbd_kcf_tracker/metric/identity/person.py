@@ -33,8 +33,8 @@ SLOW, STANDS, SWAYING = 0.25, 0.7, 0.4
 """Metres a second below which a person stands, the probability that he goes on standing, and metres
 a second by which his next place is unknown if he does."""
 TURNED = 0.5
-"""Probability that who was missed has stopped or turned round meanwhile, rather than gone on: even,
-as nothing was seen of it. Of a man who turned round behind another somebody new was made."""
+"""Probability that who was missed, and may still be behind what hid him, has stopped or turned
+round meanwhile rather than gone on: even, as nothing was seen of it."""
 VELOCITY_TIME = 0.3
 """Seconds after which a velocity is two thirds of what the sightings since then tell: two frames at
 5 Hz, since one alone may be off by as much as a step."""
