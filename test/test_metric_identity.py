@@ -1665,10 +1665,12 @@ def test_a_slow_camera_misses_nobody(step: float):
 
 def test_after_a_pause_nobody_is_the_target_at_once():
     """However alike: all may have gone and others come; some sightings must bear it out."""
-    targets, _, person = followed()
+    targets, number, person = followed()
     known, taken = person.seen_at, []
     for i in range(12):
         targets.update(picture([Someone(0.05 * i, 3.0)], 30.0 + 0.1 * i))
+        if i == 0:  # that anybody may have come was not asked of the first frame
+            assert targets._followers[number].doubts[evidence.SOMEBODY_NEW] < -0.5
         taken.append(person.seen_at > known)
     assert not any(taken[:3])
     assert taken[-1]

@@ -259,7 +259,7 @@ class Follower:
             # but a thing that was in view until the camera paused is hardly another one.
             part = self.person.figure and surface.hidden_for > 0
             new = account.owner[index] < 0 if index >= 0 else part
-            against = account.against * away(surface.hidden_for)
+            against = account.against * away(account.time - self.person.seen_at)
             if new or (stranger is not None and not self._recognised(stranger, account.time)):
                 box = surface.box(account.scene, found)
                 belief = surface.glimpse(account.scene, found)
