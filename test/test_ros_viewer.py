@@ -238,9 +238,14 @@ def test_the_live_page_shows_why_and_where_a_hidden_target_may_be(rig: Rig) -> N
         )
         assert 'log-odds' in words
         assert 'look' in cues
-        candidate, target = page.value(
-            '[page.shown.targets[0].considered[0].box, page.shown.targets[0].box]'
+        # One that was asked for last may just begin: of its first frame nothing was considered.
+        both: list[Any] = []
+        weighed = (
+            '(t => t && t.box && t.considered?.length ? [t.considered[0].box, t.box] : null)'
+            '(page.shown.targets[0])'
         )
+        until(rig, lambda: both.append(page.value(weighed)) or both[-1] is not None)
+        candidate, target = both[-1]
         assert candidate == pytest.approx(target, abs=0.02)
         assert page.value("document.querySelectorAll('.views b i').length") >= 9
         assert page.value('page.shown.floor') is None  # the scene has none
