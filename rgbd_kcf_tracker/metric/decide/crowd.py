@@ -286,15 +286,15 @@ class Account:
                 came = self.time if self.was_away(other) else other.came
                 look = other.gallery.log_odds_before(came, view, alike)
             if look is not None:
-                total += math.exp(look) * (1.0 - self._is_same(other, person))
+                total += math.exp(look) * self._is_another(other, person)
         return total
 
-    def _is_same(self, other: Person, person: Person) -> float:
-        """Probability that another who is known is a person who had gone, 0 to 1."""
+    def _is_another(self, other: Person, person: Person) -> float:
+        """How likely somebody known is not a person who had gone, under another number, 0 to 1."""
         alike = other.resemblance(person.number)
         if alike is None or other.chosen or other.number in person.met:
-            return 0.0
-        return 1.0 / (1.0 + math.exp(self.against - alike))
+            return 1.0
+        return is_new(alike, self.against)
 
     def room_share(self, seen: Silhouette) -> float:
         """Share of a silhouette's pixels that show the room, 0 to 1."""

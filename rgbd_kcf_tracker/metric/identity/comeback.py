@@ -50,10 +50,10 @@ class Likely:
 
 
 class Comeback:
-    """One return of a target, which may be somebody else.
+    """One return of a target, or of anybody else who was known, who may be somebody else.
 
     Args:
-        person: the target, as it was known before.
+        person: he, as he was known before.
         time: seconds of the return.
         against: log-odds against anybody coming back just then.
 
