@@ -170,37 +170,54 @@ class BySurface:
     def surface_of(account: Account, box: Box) -> Silhouette | None:
         """The figure or surface that a box of the image is drawn about, None where none fits."""
         scene = account.scene
+        whole = BySurface.whole_of(account, box)
+        if whole is not None:
+            return BySurface._within(scene, whole, box)
+        return BySurface._piece_of(scene, box) or BySurface._scattered(scene, box)
+
+    @staticmethod
+    def whole_of(account: Account, box: Box) -> Silhouette | None:
+        """The figure or surface that is as large as a box, with what of it sticks out of the box."""
         figure = BySurface._figure_of(account, box)
         if figure is not None:
-            return BySurface._within(scene, figure, box)
-        step = scene.view.step
+            return figure
+        scene = account.scene
         rows, cols = scene.view.shape
-        x0, y0 = max(0.0, box.x / step), max(0.0, box.y / step)
-        x1, y1 = min(float(cols), box.right / step), min(float(rows), box.bottom / step)
-        if x1 - x0 < 1 or y1 - y0 < 1:
+        b = box.over(scene.view.step).clipped(cols, rows)
+        if b is None:
             return None
         boxes = scene.surfaces.boxes.astype(np.float64)
-        across = np.minimum(boxes[:, 0] + boxes[:, 2], x1) - np.maximum(boxes[:, 0], x0)
-        down = np.minimum(boxes[:, 1] + boxes[:, 3], y1) - np.maximum(boxes[:, 1], y0)
+        across = np.minimum(boxes[:, 0] + boxes[:, 2], b.right) - np.maximum(boxes[:, 0], b.x)
+        down = np.minimum(boxes[:, 1] + boxes[:, 3], b.bottom) - np.maximum(boxes[:, 1], b.y)
         common = np.clip(across, 0, None) * np.clip(down, 0, None)
-        iou = common / (boxes[:, 2] * boxes[:, 3] + (x1 - x0) * (y1 - y0) - common)
+        iou = common / (boxes[:, 2] * boxes[:, 3] + b.area - common)
         iou[0] = 0
         # A wall behind may fill the box as well: it must be the surface that the box shows.
-        inside = scene.surfaces.labels[int(y0) : int(np.ceil(y1)), int(x0) : int(np.ceil(x1))]
-        pixels = np.bincount(inside.ravel(), minlength=len(scene.surfaces))
-        iou *= pixels > 0
+        iou *= BySurface._shown(scene, box) > 0
         label = int(np.argmax(iou))
-        if iou[label] >= LOCK_IOU:
-            return BySurface._within(scene, scene.silhouette(label), box)
-        # Two who touch are one surface: the part of it that the box shows is the target.
-        pixels[0] = 0
-        label = int(np.argmax(pixels))
-        large = scene.surfaces.pixels[label] > MOST_SHARE * inside.size
-        if not large and pixels[label] >= LEAST_FILL * inside.size:
-            part = BySurface._within(scene, scene.silhouette(label), box)
-            if BySurface.outline(scene, part).iou(box) >= LOCK_IOU:
-                return part
-        return BySurface._scattered(scene, box)
+        return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
+
+    @staticmethod
+    def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
+        """The part of a surface that a box shows: two who touch are one surface."""
+        shown = BySurface._shown(scene, box)
+        total = shown.sum()
+        shown[0] = 0
+        label = int(np.argmax(shown))
+        large = scene.surfaces.pixels[label] > MOST_SHARE * total
+        if large or shown[label] < max(1.0, LEAST_FILL * total):
+            return None
+        part = BySurface._within(scene, scene.silhouette(label), box)
+        return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None
+
+    @staticmethod
+    def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
+        """``(k,)`` how many pixels of each surface a box shows."""
+        b, (rows, cols) = box.over(scene.view.step), scene.view.shape
+        x0, x1 = np.clip((math.floor(b.x), math.ceil(b.right)), 0, cols)
+        y0, y1 = np.clip((math.floor(b.y), math.ceil(b.bottom)), 0, rows)
+        labels = scene.surfaces.labels[y0:y1, x0:x1]
+        return np.bincount(labels.ravel(), minlength=len(scene.surfaces))
 
     @staticmethod
     def _figure_of(account: Account, box: Box) -> Silhouette | None:

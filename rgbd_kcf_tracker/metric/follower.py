@@ -508,8 +508,8 @@ class Follower:
         if look is None:
             self._agreed = 0
             return False
-        seen = BySurface.surface_of(account, look.box)
-        if seen is not None and BySurface.outline(account.scene, seen).iou(look.box) > RELOCK_IOU:
+        whole = BySurface.whole_of(account, look.box)
+        if whole is not None and BySurface.outline(account.scene, whole).iou(look.box) > RELOCK_IOU:
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:
                 self._lock(frame, account, look.box)
