@@ -348,6 +348,19 @@ def test_what_shows_behind_a_target_that_has_gone_is_not_the_target():
         assert track.box is None
 
 
+def test_a_face_does_not_become_the_body_below_it():
+    """What was cut out of the body by the box of the look had the same outline as that."""
+    run = follow(simulate('face', seed=84, rate_hz=5.0, duration_s=3.0, size=SIZE))
+    assert run.success == 1.0
+
+
+def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
+    """The box stayed on the first of them, and nobody was found when he had left."""
+    run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))
+    late = run.overlaps[-4:]
+    assert min(late) > 0.5
+
+
 def test_a_thing_in_a_hand_is_found_again_where_it_was_carried_to():
     """It is no figure there, but stands before the room; what is a part of the room is not it."""
     pattern = np.kron([[0, 1, 0, 1], [1, 0, 1, 1], [0, 0, 1, 0]], np.ones((7, 6))) > 0

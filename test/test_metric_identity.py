@@ -663,6 +663,20 @@ def test_who_came_back_is_less_likely_the_target_beside_another_who_is_as_like_i
     assert beside.hear(red, {}, 0.0, 10.1).looks == pytest.approx(1 / (1 + np.exp(-odds)))
 
 
+def test_another_in_view_is_heard_once_enough_was_seen_of_him_also_when_nobody_else_is():
+    red, green = look(RED), look(GREEN)
+    person, comeback = returned(red)
+    comeback.hear(green, {2: red}, 0.0, 10.0)
+    assert comeback.likely is not None
+    assert comeback.likely.rival == 0.0
+    likely = comeback.hear(None, {2: red}, 0.0, 10.5)
+    odds, mine = np.exp(person.gallery.log_odds(red)), np.exp(person.gallery.log_odds(green))
+    assert likely.rival == pytest.approx(odds / (1 + odds + mine))
+    assert likely.looks == pytest.approx(mine / (1 + odds + mine))
+    # Who has left is nobody's rival.
+    assert comeback.hear(None, {}, 0.0, 10.6).rival == 0.0
+
+
 @pytest.mark.parametrize(
     ('seen', 'against', 'stays'), [(RED, 0, True), (GREEN, 0, False), (RED, 6, False)]
 )

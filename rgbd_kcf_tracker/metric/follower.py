@@ -250,9 +250,7 @@ class Follower:
         found = surface.step(account, frame, dt)
         if surface.was_away:
             self._withdraw()
-        if found is None:
-            return self._glance(frame, account, view, dt, surface)
-        if surface.was_away and self.person is not None:
+        if found is not None and surface.was_away and self.person is not None:
             index = account.sight_of(found.seen)
             stranger = account.stranger(self.person, index)
             # A part of somebody, where all of the target is a figure, tells not for good who it is;
@@ -274,14 +272,18 @@ class Follower:
             if self.person.figure and self.person.gallery.views:
                 self._comeback = Comeback(self.person, account.time, against)
             surface.resume(found)
-        score = found.probability
+        likely = None
         if self._comeback is not None:
-            likely = self._likely(self._comeback, account, found.seen)
-            score *= likely.score
-            self._doubt(KNOWN_BEFORE, found, score)
-            if likely.looks < DISOWNED:
+            likely = self._likely(self._comeback, account, found)
+            if likely.looks < max(DISOWNED, likely.rival):
                 self._disown(self._comeback, account.time, surface)
                 return self._hidden(frame, dt)
+        if found is None:
+            return self._glance(frame, account, view, dt, surface)
+        score = found.probability
+        if likely is not None:
+            score *= likely.score
+            self._doubt(KNOWN_BEFORE, found, score)
         whole = self._whole(account, found.seen)
         if whole is not None:
             self._start_over(account, whole)
@@ -301,10 +303,11 @@ class Follower:
     def _doubt(self, cue: str, found: Candidate, score: float) -> None:
         self.doubts[cue] = logit(score) - logit(found.probability)
 
-    def _likely(self, comeback: Comeback, account: Account, seen: Silhouette) -> Likely:
+    def _likely(self, comeback: Comeback, account: Account, found: Candidate | None) -> Likely:
         """Whether a returned target is the target, by what was known before it left."""
         assert self.person is not None
-        mine = account.sight_of(seen)
+        mine = -1 if found is None else account.sight_of(found.seen)
+        look = None if found is None else account.look(found.seen)
         others = {
             account.people[owner].number: account.sights[index].view
             for index, owner in enumerate(account.owner)
@@ -314,7 +317,7 @@ class Follower:
             and account.people[owner].number not in comeback.met
         }
         known = account.as_others(self.person, mine)
-        return comeback.hear(account.look(seen), others, known, account.time)
+        return comeback.hear(look, others, known, account.time)
 
     def _withdraw(self) -> None:
         """What was learned of a return that was not borne out is not of the target."""

@@ -42,10 +42,12 @@ class Likely:
 
     Attributes:
         looks: by his looks, beside all in view.
+        rival: how likely another in view is the target, the likeliest of whom enough was seen.
         score: beside all others who are known, and anybody new, as well.
     """
 
     looks: float
+    rival: float
     score: float
 
 
@@ -72,28 +74,35 @@ class Comeback:
         self._new, self._settled = math.exp(against), False
         self._mine, self._others = _Heard(), dict[int, _Heard]()
 
-    def hear(self, view: View, others: dict[int, View], known: float, time: float) -> Likely:
+    def hear(self, view: View | None, others: dict[int, View], known: float, time: float) -> Likely:
         """Take a frame, and say whether who came back is the target.
 
         Args:
-            view: of who came back.
+            view: of who came back; None where he is not seen.
             others: of all in view who may be the target as well, by their numbers. Of these one is
                 looked at in each frame, who was looked at longest ago.
             known: odds that he is somebody else who is known, see
                 :meth:`~rgbd_kcf_tracker.metric.decide.crowd.Account.as_others`.
             time: seconds.
         """
-        self._look(self._mine, view, time)
+        if view is not None:
+            self._look(self._mine, view, time)
         for number in others:
             self._others.setdefault(number, _Heard())
         if others:
             number = min(others, key=lambda each: self._others[each].time)
             self._look(self._others[number], others[number], time)
         mine = math.exp(self.odds)
-        rivals = (self._others[number].tally.mean or 0.0 for number in others)
+        rivals = [self._others[number].tally for number in others]
+        heard = [math.exp(each.mean) for each in rivals if each.mean and each.mean > 0]
+        believed = [math.exp(each.mean) for each in rivals if each.enough and each.mean]
         # Each may be the target, or none of them.
-        either = mine + sum(math.exp(odds) for odds in rivals if odds > 0)
-        self.likely = Likely(mine / (1.0 + either), mine / (self._new + known + either))
+        either = mine + sum(heard)
+        self.likely = Likely(
+            looks=mine / (1.0 + either),
+            rival=max(believed, default=0.0) / (1.0 + either),
+            score=mine / (self._new + known + either),
+        )
         return self.likely
 
     def settle(self, person: Person) -> None:

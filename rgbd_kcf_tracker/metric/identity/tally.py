@@ -47,6 +47,11 @@ class Tally:
         return self._total / self._count if self._count > 0 else None
 
     @property
+    def enough(self) -> bool:
+        """Whether so many sightings count that they are believed."""
+        return self._count >= ENOUGH
+
+    @property
     def believed(self) -> float:
         """Log-odds by all of them, less where less than a glimpse was seen."""
         return self.odds(enough=0.0) * min(1.0, self._count / GLIMPSE)
