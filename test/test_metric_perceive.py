@@ -202,6 +202,19 @@ def test_who_stood_there_before_another_passed_is_not_the_room_though_some_of_hi
     assert room.before[40:100, 52:72].all()
 
 
+def test_who_stands_shows_whole_again_when_another_has_passed_close_before_him():
+    """Who passed less than a step before him took his place, and he was what is behind."""
+    room = Room()
+    room.restart(with_thing(2.5), with_thing(2.5) == 2.5)
+    passes = [2.5] * 4 + [2.1, 1.95, 1.95, 1.95]
+    for z in (*passes, 2.5, 2.5):
+        see(room, with_thing(z), 0.1, None)
+    assert room.before[THING].all()
+    for z in (*passes, 2.8, 2.8):  # he has gone meanwhile, and a chair stands behind
+        see(room, with_thing(z), 0.1, None)
+    assert not room.before[THING].any()
+
+
 def test_who_steps_back_to_a_far_wall_does_not_become_the_wall():
     first = wall(4.45)
     first[THING] = 4.0

@@ -177,7 +177,7 @@ class BySurface:
 
     @staticmethod
     def whole_of(account: Account, box: Box) -> Silhouette | None:
-        """The figure or surface that is as large as a box, with what of it sticks out of the box."""
+        """The figure or surface as large as a box, with what of it lies beside the box as well."""
         figure = BySurface._figure_of(account, box)
         if figure is not None:
             return figure

@@ -686,6 +686,8 @@ class Crowd:
 
         What was learned of them since is taken back where some seconds do not bear it out.
         """
+        if not self._comebacks:
+            return
         owners = {account.people[row]: n for n, row in enumerate(account.owner) if row >= 0}
         here = {p.number: p for p in self.people if not p.chosen}
         self._comebacks = {n: each for n, each in self._comebacks.items() if n in here}

@@ -144,6 +144,8 @@ class Room:
         self.still: Mask = self.before
         self._farther: DepthArray = self.depth
         self._front: DepthArray = self.depth
+        self._stood, self._stood_at = self.depth, self.depth
+        self._time = 0.0
         self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
@@ -158,6 +160,8 @@ class Room:
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
         self._front = np.where(somebody, depth, np.float32(0))
+        self._stood, self._stood_at = np.zeros_like(depth), np.zeros_like(depth)
+        self._time = 0.0
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
@@ -192,6 +196,7 @@ class Room:
         self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._farther = np.zeros_like(self.depth)
         self._still_for = np.zeros_like(self.depth)
+        self._stood = np.zeros_like(self.depth)
         lost: Mask = unknown & ~opened
         return lost
 
@@ -261,6 +266,7 @@ class Room:
             undecided: ``(h, w)`` bool, pixels that are not taken for room where it is not known;
                 None for none.
         """
+        self._time += dt
         valid = depth > 0
         known = self.depth > 0
         allowed = tolerance(depth)
@@ -330,9 +336,16 @@ class Room:
             np.put(hidden, open_[behind], True)
             room = _continues_room(hidden, known, nearer, surfaces)
             left |= behind & room[np.take(surfaces.labels, open_)]
+        # Who stood there shows again when another has passed before him.
+        noise, stood = np.take(allowed, open_), np.take(self._stood, open_)
+        lately = self._time - np.take(self._stood_at, open_) < SETTLE
+        left &= ~(lately & (now < stood + noise))
         np.put(self._blind, open_[left], 0)
         # Who passes before somebody does not take his place.
         taken: Mask = ~left
+        stands = taken & (np.abs(now - front) < 0.5 * noise) & ~(lately & (now < stood - noise))
+        np.put(self._stood, open_[stands], now[stands])
+        np.put(self._stood_at, open_[stands], self._time)
         stays = taken & (now > front - leap)
         np.put(self._front, open_[stays], now[stays])
         return taken
