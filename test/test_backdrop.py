@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 
@@ -112,6 +113,23 @@ def test_light_that_changes_is_no_motion(walked, light):
         assert outline is not None
         assert outline.box == Box.from_corners(body.x, body.y, arm(body).right, body.bottom)
         backdrop.learn(body)
+
+
+def test_a_camera_that_creeps_by_a_part_of_a_pixel_moves_as_well():
+    """Every edge differed from the backdrop in the end, and hung on to the target."""
+    shelves = np.random.default_rng(2).integers(40, 200, (9, 16, 3), dtype=np.uint8)
+    shelves = cv2.resize(shelves, (160, 90), interpolation=cv2.INTER_NEAREST)
+    backdrop, widest = Backdrop(picture(BODY, room=shelves), BODY), 0.0
+    for k in range(1, 30):
+        body = BODY.moved(2 * k, 0)
+        crept = cv2.warpAffine(
+            shelves, np.array([[1, 0, 0.2 * k], [0, 1, 0.1 * k]]), (160, 90), borderMode=1
+        )
+        backdrop.see(picture(body, room=crept, seed=k), body, 0.1)
+        outline = backdrop.outline(body, red)
+        widest = max(widest, 0.0 if outline is None else outline.box.width)
+        backdrop.learn(body)
+    assert widest < 1.5 * BODY.width
 
 
 def test_a_camera_that_has_moved_says_nothing_until_it_stands_again(walked):

@@ -22,7 +22,12 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in, part_of
-from rgbd_kcf_tracker.metric.perceive.ego_motion import changed, corners_between, stands
+from rgbd_kcf_tracker.metric.perceive.ego_motion import (
+    LEAST_CORNERS,
+    changed,
+    corners_between,
+    stands,
+)
 
 Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
@@ -40,6 +45,10 @@ SETTLED = 1.0
 """Seconds without a change after which what differs is the backdrop although no outline tells the
 target from it: it was taken for the backdrop while something passed. Of who walks, no clothes stay
 where they are for so long."""
+CREPT, CREEPS = 0.3, 2.0
+"""Seconds after which it is asked whether the camera has crept, and pixels by which it has at the
+most: from one picture to the next it moves by a part of a pixel then, and some pictures later every
+edge differs from the backdrop. What has moved by more is somebody who passes."""
 MARGIN = 1.15
 """Sides of the box, in units of the target's, inside which nothing is learned unless its outline is
 known: an arm or a foot sticks out by so much."""
@@ -141,6 +150,7 @@ class Backdrop:
         self._area = self._may_part = 0
         self.met = False
         self._mine = self._within(box.scaled(MARGIN))
+        self._anchor, self._unasked = gray, 0.0
 
     def see(self, image: Image, box: Box, dt: float) -> None:
         """Take the next picture.
@@ -153,7 +163,7 @@ class Backdrop:
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         self.met = False
         around = self._within(box.scaled(MARGIN)) if image.shape == self._last.shape else None
-        if around is None or self._camera_moved(gray, ~around):
+        if around is None or self._camera_moved(gray, ~around) or self._crept(gray, ~around, dt):
             self._start(image, gray, box)
             return
         self._same += self._same < 255
@@ -309,6 +319,20 @@ class Backdrop:
             return False
         corners = corners_between(self._gray, gray, outside)
         return corners is None or not stands(self._gray, gray, *corners)
+
+    def _crept(self, gray: Image, outside: Mask, dt: float) -> bool:
+        """Whether the camera has moved since it was last asked, by too little for any picture."""
+        self._unasked += dt
+        if self._unasked < CREPT:
+            return False
+        anchor, self._anchor, self._unasked = self._anchor, gray, 0.0
+        corners = corners_between(anchor, gray, outside)
+        if corners is None:
+            return False
+        first, second = corners
+        slow = np.abs(second - first).max(axis=1) < CREEPS
+        enough = np.count_nonzero(slow) >= LEAST_CORNERS
+        return bool(enough) and not stands(anchor, gray, first[slow], second[slow])
 
     def _follow_light(self, image: Image) -> None:
         """Light that changes changes all alike: the median pixel is what it was."""
