@@ -673,7 +673,8 @@ def test_another_in_view_is_heard_once_enough_was_seen_of_him_also_when_nobody_e
     odds, mine = np.exp(person.gallery.log_odds(red)), np.exp(person.gallery.log_odds(green))
     assert likely.rival == pytest.approx(odds / (1 + odds + mine))
     assert likely.looks == pytest.approx(mine / (1 + odds + mine))
-    # Who has left is nobody's rival.
+    # He is followed himself, or has left: nobody's rival.
+    assert comeback.hear(None, {2: red}, 0.0, 10.6, followed={2}).rival == 0.0
     assert comeback.hear(None, {}, 0.0, 10.6).rival == 0.0
 
 

@@ -317,7 +317,8 @@ class Follower:
             and account.people[owner].number not in comeback.met
         }
         known = account.as_others(self.person, mine)
-        return comeback.hear(look, others, known, account.time)
+        followed = {person.number for person in account.owners if person.chosen}
+        return comeback.hear(look, others, known, account.time, followed)
 
     def _withdraw(self) -> None:
         """What was learned of a return that was not borne out is not of the target."""

@@ -11,6 +11,7 @@ that nobody else in view has them more.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from rgbd_kcf_tracker.metric.identity.gallery import View
@@ -74,7 +75,14 @@ class Comeback:
         self._new, self._settled = math.exp(against), False
         self._mine, self._others = _Heard(), dict[int, _Heard]()
 
-    def hear(self, view: View | None, others: dict[int, View], known: float, time: float) -> Likely:
+    def hear(
+        self,
+        view: View | None,
+        others: dict[int, View],
+        known: float,
+        time: float,
+        followed: Collection[int] = (),
+    ) -> Likely:
         """Take a frame, and say whether who came back is the target.
 
         Args:
@@ -84,6 +92,8 @@ class Comeback:
             known: odds that he is somebody else who is known, see
                 :meth:`~rgbd_kcf_tracker.metric.decide.crowd.Account.as_others`.
             time: seconds.
+            followed: numbers of those others who are followed themselves: nobody's rivals, as the
+                target is not found again in them.
         """
         if view is not None:
             self._look(self._mine, view, time)
@@ -93,14 +103,17 @@ class Comeback:
             number = min(others, key=lambda each: self._others[each].time)
             self._look(self._others[number], others[number], time)
         mine = math.exp(self.odds)
-        rivals = [self._others[number].tally for number in others]
-        heard = [math.exp(each.mean) for each in rivals if each.mean and each.mean > 0]
-        believed = [math.exp(each.mean) for each in rivals if each.enough and each.mean]
-        # Each may be the target, or none of them.
-        either = mine + sum(heard)
+        either, rival = mine, 0.0  # each may be the target, or none of them
+        for number in others:
+            tally = self._others[number].tally
+            odds = tally.mean or 0.0
+            if odds > 0:
+                either += math.exp(odds)
+                if tally.enough and number not in followed:
+                    rival = max(rival, math.exp(odds))
         self.likely = Likely(
             looks=mine / (1.0 + either),
-            rival=max(believed, default=0.0) / (1.0 + either),
+            rival=rival / (1.0 + either),
             score=mine / (self._new + known + either),
         )
         return self.likely
