@@ -25,6 +25,8 @@ from rclpy.node import Node
 
 from rgbd_kcf_tracker import create_tracker
 from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
+from rgbd_kcf_tracker.live.replay_source import ReplaySource
 from rgbd_kcf_tracker.recordings import SequenceWriter, open_recording
 from rgbd_kcf_tracker.recordings.images import decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
@@ -184,6 +186,8 @@ def test_a_sequence_folder_is_replayed_like_a_bag(tmp_path: Path) -> None:
     with SequenceWriter(folder) as writer:
         for made in rig.frames()[:10]:
             writer.write(made.frame, made.visible, made.body)
+    with pytest.raises(RgbdKcfError, match='ends before start, 60 s: it lasts'):
+        ReplaySource(folder, ReplayParameters(start=60.0))
     with (
         rig.Listener() as heard,
         rig.running_tracker(
@@ -252,7 +256,7 @@ def test_trackers_of_another_name_are_pointed_out(
         ({'bag': 'BAG', 'topics': ['/color/image', '/nothing']}, 'has no topic /nothing.'),
         ({'bag': 'BAG', 'color_topic': '/nope'}, 'another as the parameter color_topic:=TOPIC'),
         ({'bag': 'BAG', 'info_topic': '/nope'}, 'give another as the parameter info_topic:=TOPIC'),
-        ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 0.0}, 'ends before start'),
+        ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 1e3}, 'ends before start, 1e+06 s'),
     ],
 )
 @pytest.mark.usefixtures('_process')

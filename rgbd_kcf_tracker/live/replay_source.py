@@ -62,7 +62,8 @@ class ReplaySource(Closing):
         warnings: what was odd.
 
     Raises:
-        RecordingError: where it cannot be opened, or holds nothing that is asked for.
+        RecordingError: where it cannot be opened, holds nothing that is asked for, or ends before
+            it is to start.
     """
 
     def __init__(self, path: Path, parameters: ReplayParameters) -> None:
@@ -88,6 +89,11 @@ class ReplaySource(Closing):
         self.depth_topic = self._messages.depth_topic
         try:
             self.topics = self._chosen_topics(path, parameters)
+            seconds = self._messages.seconds(frozenset(t.name for t in self.topics))
+            if parameters.start > seconds:
+                raise RecordingError(
+                    f'{path} ends before start, {parameters.start:g} s: it lasts {seconds:.1f} s'
+                )
         except BaseException:
             self._messages.close()
             raise
@@ -134,15 +140,9 @@ class ReplaySource(Closing):
         """All messages from ``start_s`` seconds after the first, in recorded order.
 
         Raises:
-            RecordingError: where the recording cannot be read on, or ends before ``start_s``.
+            RecordingError: where the recording cannot be read on.
         """
-        names = frozenset(t.name for t in self.topics)
-        found = False
-        for message in self._messages.read(names, start_s):
-            found = True
-            yield message
-        if not found:
-            raise RecordingError(f'{self.name} ends before start, {start_s:g} s')
+        return self._messages.read(frozenset(t.name for t in self.topics), start_s)
 
     def first_info(self) -> Message | None:
         """The first message of the camera's CameraInfo topic."""
@@ -217,6 +217,11 @@ class _BagMessages:
         found = self._translate.type_of(topic.type)
         return None if found is None else found[0]
 
+    def seconds(self, names: frozenset[str]) -> float:
+        """From the first to the last message of some topics."""
+        logged = [t.log_ns for t in self._bag.topics.values() if t.name in names and len(t)]
+        return (max(map(max, logged)) - min(map(min, logged))) * 1e-9
+
     def read(self, names: frozenset[str], start_s: float) -> Iterator[Message]:
         first: int | None = None
         for topic, index in self._bag.in_order(names):
@@ -256,6 +261,7 @@ class _FolderMessages:
         self._recording = SequenceFolder(path, options)
         self.warnings = self._recording.warnings
         info = self._recording.info()
+        self._seconds = info.duration_s
         self.color_topic: str | None = FOLDER_TOPICS.color
         self.depth_topic = FOLDER_TOPICS.depth if info.frames_with_depth else None
         self.info_topic = None if info.intrinsics is None else FOLDER_TOPICS.info
@@ -265,6 +271,11 @@ class _FolderMessages:
             (self.depth_topic, _IMAGE, info.frames_with_depth),
         )
         self.topics = [SourceTopic(name, kind, n) for name, kind, n in counts if name is not None]
+
+    def seconds(self, names: frozenset[str]) -> float:
+        """From the first to the last message of some topics: all come with every frame."""
+        del names
+        return self._seconds
 
     def read(self, names: frozenset[str], start_s: float) -> Iterator[Message]:
         first: int | None = None
