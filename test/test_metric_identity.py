@@ -1803,8 +1803,9 @@ def test_what_lowers_the_score_of_who_came_back_is_among_its_cues():
     targets, number, _ = followed()
     for i in range(10):
         targets.update(picture([], 1.3 + 0.5 * i))
-    said = {evidence.SOMEBODY_NEW: [], evidence.KNOWN_BEFORE: []}
+    said, given_up = {evidence.SOMEBODY_NEW: [], evidence.KNOWN_BEFORE: []}, []
     for i in range(40):
+        shown = targets._followers[number].track.box is not None
         people = [Someone(-0.8 + 0.03 * i, 2.6, RED, GREEN)]
         if i >= 26:
             people.append(Someone(0.9 - 0.02 * (i - 26), 3.4))
@@ -1818,6 +1819,10 @@ def test_what_lowers_the_score_of_who_came_back_is_among_its_cues():
             assert considered[0].probability == pytest.approx(track.score)
         for cue, values in said.items():
             values.append(considered[0].cues[cue] if considered else 0.0)
+        if shown and track.box is None:
+            given_up.append(said[evidence.KNOWN_BEFORE][-1])
+    assert given_up, 'he is not the target after all'
+    assert max(given_up) < -1, 'and that is why'
     new, known = said.values()
     assert new[0] < 0, 'anybody may come'
     assert min(known) < -3, 'his trousers are not the ones that were known'

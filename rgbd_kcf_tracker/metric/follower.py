@@ -272,18 +272,17 @@ class Follower:
             if self.person.figure and self.person.gallery.views:
                 self._comeback = Comeback(self.person, account.time, against)
             surface.resume(found)
-        likely = None
+        score = 0.0 if found is None else found.probability
         if self._comeback is not None:
             likely = self._likely(self._comeback, account, found)
+            if found is not None:
+                score *= likely.score
+                self._doubt(KNOWN_BEFORE, found, score)
             if likely.looks < max(DISOWNED, likely.rival):
                 self._disown(self._comeback, account.time, surface)
                 return self._hidden(frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
-        score = found.probability
-        if likely is not None:
-            score *= likely.score
-            self._doubt(KNOWN_BEFORE, found, score)
         whole = self._whole(account, found.seen)
         if whole is not None:
             self._start_over(account, whole)

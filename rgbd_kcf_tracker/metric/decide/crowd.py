@@ -723,7 +723,7 @@ class Crowd:
             if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
-            self._comebacks[person.number] = Comeback(person, newcomer.first_seen, account.against)
+            self._came_back(person, newcomer.first_seen, account.against)
             row = account.people.index(newcomer)
             account.owner = [
                 account.people.index(person) if each == row else each for each in account.owner

@@ -327,7 +327,8 @@ class Room:
             surfaces: of the view.
         """
         now, front = np.take(depth, open_), np.take(self._front, open_)
-        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + np.take(allowed, open_)
+        noise = np.take(allowed, open_)
+        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + noise
         left = (front > 0) & (now > front + leap)
         # What is farther than who stood there, and goes on as the room, is the room.
         behind = ~left & (now > front + np.float32(BEHIND))
@@ -337,7 +338,7 @@ class Room:
             room = _continues_room(hidden, known, nearer, surfaces)
             left |= behind & room[np.take(surfaces.labels, open_)]
         # Who stood there shows again when another has passed before him.
-        noise, stood = np.take(allowed, open_), np.take(self._stood, open_)
+        stood = np.take(self._stood, open_)
         lately = self._time - np.take(self._stood_at, open_) < SETTLE
         left &= ~(lately & (now < stood + noise))
         np.put(self._blind, open_[left], 0)
