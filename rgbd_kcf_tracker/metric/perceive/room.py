@@ -10,6 +10,8 @@ still and belongs to nobody becomes part of the room.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +48,12 @@ the room, from which that part is room, too."""
 GOES_ON = 0.25
 """Share of a surface that must be known to stand before the room, and no less of it than is room,
 for the rest of it to be somebody too."""
+GOES_ON_AREA = 0.06
+"""Square metres of it that are enough whatever its size, about a head and a shoulder: who walks into
+the view of a camera that turns shows more beyond its last end than within."""
+REACH = 0.5
+"""Metres from the middle of somebody as far as which a surface that is larger than anybody may still
+be he: half of someone with arms half spread. Who touches a desk is not the desk."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
@@ -60,6 +68,12 @@ def tolerance(depth: DepthArray) -> DepthArray:
     allowed *= np.float32(NOISE_PER_SQUARE_METRE)
     allowed += np.float32(NOISE)
     return allowed
+
+
+def _leap(dt: float, noise: DepthArray) -> DepthArray:
+    """Metres by which the depth of somebody may have gone up, given the noise of each reading."""
+    leap: DepthArray = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + noise
+    return leap
 
 
 def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
@@ -127,6 +141,20 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
     result: Mask = (goes_on > MOST * meets) & (before <= of_it)
     result[0] = False
     return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GoingOn:
+    """What goes on from somebody as one surface: pixels of a view.
+
+    Attributes:
+        somebody: ``(h, w)`` bool, what may be he.
+        beyond: ``(h, w)`` bool, what is farther from his middle than anybody reaches: something, or
+            somebody else, that he touches.
+    """
+
+    somebody: Mask
+    beyond: Mask
 
 
 class Room:
@@ -228,22 +256,45 @@ class Room:
         self.before &= ~part
         return True
 
-    def going_on(self, depth: DepthArray, surfaces: Surfaces) -> Mask:
-        """Pixels, ``(h, w)`` bool, of surfaces of which what is known stands before the room.
+    def going_on(
+        self,
+        depth: DepthArray,
+        surfaces: Surfaces,
+        large: npt.NDArray[np.bool_],
+        k: Intrinsics,
+        dt: float,
+    ) -> GoingOn:
+        """What may be somebody as it goes on as one surface from what stands before the room.
 
         Args:
             depth: ``(h, w)`` metres of a view.
             surfaces: of it.
+            large: ``(n,)`` bool, those of them that nobody can be.
+            k: of the view.
+            dt: seconds since the last.
         """
-        valid, known = depth > 0, self.depth > 0
-        nearer = known & (self.depth - depth > tolerance(depth))
-        nearer |= ~known & (self._blind >= BLIND_FRAMES)
-        before = np.bincount(surfaces.labels[valid & nearer], minlength=len(surfaces))
-        room = np.bincount(surfaces.labels[valid & known & ~nearer], minlength=len(surfaces))
-        somebody = (before > room) & (before > GOES_ON * surfaces.pixels)
-        somebody[0] = False
-        result: Mask = somebody[surfaces.labels]
-        return result
+        valid, known, count = depth > 0, self.depth > 0, len(surfaces)
+        allowed = tolerance(depth)
+        # Where somebody stood, what is far behind him is not he.
+        gone = (self._front > 0) & (depth > self._front + _leap(dt, allowed))
+        nearer = known & (self.depth - depth > allowed)
+        nearer |= ~known & (self._blind >= BLIND_FRAMES) & ~gone
+        nearer &= valid
+        theirs = surfaces.labels[nearer]
+        before = np.bincount(theirs, minlength=count)
+        room = np.bincount(surfaces.labels[valid & known & ~nearer], minlength=count)
+        share = before / np.maximum(surfaces.pixels, 1)
+        enough = (share > GOES_ON) | (share * surfaces.areas(k) > GOES_ON_AREA)
+        whose = (before > room) & enough
+        whose[0] = False
+        somebody: Mask = whose[surfaces.labels]
+        rows, columns = np.nonzero(somebody)
+        label = surfaces.labels[rows, columns]
+        middle = np.bincount(theirs, np.nonzero(nearer)[1], count) / np.maximum(before, 1)
+        far = large[label] & (np.abs(columns - middle[label]) * depth[rows, columns] > REACH * k.fx)
+        beyond = np.zeros_like(somebody)
+        beyond[rows[far], columns[far]] = True
+        return GoingOn(somebody & ~beyond, beyond)
 
     def update(
         self,
@@ -328,7 +379,7 @@ class Room:
         """
         now, front = np.take(depth, open_), np.take(self._front, open_)
         noise = np.take(allowed, open_)
-        leap = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + noise
+        leap = _leap(dt, noise)
         left = (front > 0) & (now > front + leap)
         # What is farther than who stood there, and goes on as the room, is the room.
         behind = ~left & (now > front + np.float32(BEHIND))

@@ -176,10 +176,15 @@ class SceneReader:
                 people = upright_people(
                     view, surfaces, elevation, forward, axes[0], self._rim, whole=True
                 )
-                people |= self.room.going_on(view.depth, surfaces)
+                large = _large(Sizes.of(surfaces, view.intrinsics))
+                going_on = self.room.going_on(
+                    view.depth, surfaces, large, view.intrinsics, seconds
+                )
+                people |= going_on.somebody
                 self.room.open(people & unknown, view.depth)
-                # Whose other side comes into view next may be somebody or something.
-                undecided = _at_side(view, surfaces, self._rim)
+                # Whose other side comes into view next may be somebody or something, and so may
+                # be what somebody touches.
+                undecided = _at_side(view, surfaces, self._rim, large) | going_on.beyond
                 self._light.restart()
                 somebody = None
             self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided)
@@ -244,11 +249,13 @@ class SceneReader:
         return moved
 
 
-def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim) -> Mask:
-    """Pixels, ``(h, w)`` bool, of surfaces no larger than people that go on beside the view."""
+def _at_side(
+    view: DepthView, surfaces: Surfaces, rim: Rim, large: npt.NDArray[np.bool_]
+) -> Mask:
+    """Pixels, ``(h, w)`` bool, of surfaces that are not ``large`` and go on beside the view."""
     left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
     beyond = (left <= 1 + rim.left) | (left + width >= view.shape[1] - 1 - rim.right)
-    beyond &= ~_large(Sizes.of(surfaces, view.intrinsics))
+    beyond &= ~large
     beyond[0] = False
     mask: Mask = beyond[surfaces.labels]
     return mask
