@@ -280,7 +280,8 @@ def test_who_touches_a_desk_before_a_camera_that_moves_is_not_the_desk():
     depth = np.where(person | desk, np.float32(2.0), wall()).astype(np.float32)
     room.depth[:, 60:] = 0  # this has come into view
     alone = goes_on(room, depth)
-    assert (alone.somebody == (person | desk)).all() and not alone.beyond.any()
+    assert (alone.somebody == (person | desk)).all()
+    assert not alone.beyond.any()
     touched = goes_on(room, depth, large=True)
     assert not (touched.somebody & touched.beyond).any()
     assert (touched.somebody | touched.beyond)[person | desk].all()

@@ -49,11 +49,11 @@ GOES_ON = 0.25
 """Share of a surface that must be known to stand before the room, and no less of it than is room,
 for the rest of it to be somebody too."""
 GOES_ON_AREA = 0.06
-"""Square metres of it that are enough whatever its size, about a head and a shoulder: who walks into
-the view of a camera that turns shows more beyond its last end than within."""
+"""Square metres of it that are enough whatever its size, about a head and a shoulder: who walks
+into the view of a camera that turns shows more beyond its last end than within."""
 REACH = 0.5
-"""Metres from the middle of somebody as far as which a surface that is larger than anybody may still
-be he: half of someone with arms half spread. Who touches a desk is not the desk."""
+"""Metres from the middle of somebody as far as which a surface that is larger than anybody may
+still be he: half of someone with arms half spread. Who touches a desk is not the desk."""
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""

@@ -177,9 +177,7 @@ class SceneReader:
                     view, surfaces, elevation, forward, axes[0], self._rim, whole=True
                 )
                 large = _large(Sizes.of(surfaces, view.intrinsics))
-                going_on = self.room.going_on(
-                    view.depth, surfaces, large, view.intrinsics, seconds
-                )
+                going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
                 people |= going_on.somebody
                 self.room.open(people & unknown, view.depth)
                 # Whose other side comes into view next may be somebody or something, and so may
@@ -249,9 +247,7 @@ class SceneReader:
         return moved
 
 
-def _at_side(
-    view: DepthView, surfaces: Surfaces, rim: Rim, large: npt.NDArray[np.bool_]
-) -> Mask:
+def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim, large: npt.NDArray[np.bool_]) -> Mask:
     """Pixels, ``(h, w)`` bool, of surfaces that are not ``large`` and go on beside the view."""
     left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
     beyond = (left <= 1 + rim.left) | (left + width >= view.shape[1] - 1 - rim.right)
