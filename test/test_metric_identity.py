@@ -368,7 +368,33 @@ def test_what_is_short_has_a_persons_size_where_a_side_of_it_is_cut_off(cut_off:
     metres = (left, top, right, top + 0.6 * (bottom - top))
     seen = dataclasses.replace(sight, mask=short, cut=sides, metres=metres)
     assert 0.8 < seen.height < 1.2
-    assert person_sized(seen) == bool(cut_off)
+    assert person_sized(seen, 1.2) == bool(cut_off)
+
+
+@pytest.mark.parametrize(
+    ('top', 'cut_off', 'sized'),
+    [
+        (1.7, {'bottom'}, True),
+        (1.1, {'bottom'}, False),  # a monitor on a desk
+        (2.4, {'bottom'}, False),  # a lamp
+        (None, {'bottom'}, False),
+        (1.7, {'bottom', 'left'}, False),
+        (1.7, set(), False),
+    ],
+)
+def test_a_head_and_shoulders_above_the_images_end_are_somebody_near(
+    top: float | None, cut_off: set[str], sized: bool
+):
+    """Who passed close to the camera was nobody for half a second."""
+    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    share = 0.5 / sight.height
+    mask = sight.mask[: round(share * len(sight.mask))]
+    sides = Sides(*(side in cut_off for side in ('left', 'top', 'right', 'bottom')))
+    left, upper, right, _ = sight.metres
+    seen = dataclasses.replace(
+        sight, mask=mask, cut=sides, metres=(left, upper, right, upper + 0.5)
+    )
+    assert person_sized(seen, top) == sized
 
 
 def test_a_person_stays_in_the_world_while_the_camera_turns():

@@ -33,7 +33,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figur
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import HEADED, TOP, person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
 
 NEW = 0.0
@@ -45,9 +45,6 @@ among these the likeliest is enough, for who is known by few views is hardly rec
 WHOLE = 0.2
 """Square metres of a figure from which its view is learned: about a head and a chest. Of less so
 few of the slices show that others have them as well."""
-HEADED = 1.45
-"""Metres above the floor of a figure's upper end from which its head shows, even where the image
-or something nearer begins there."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new: a head and shoulders, twice the least
 that is a figure, for arms and legs that come apart from somebody are no people."""
@@ -819,7 +816,7 @@ class Crowd:
                 return
         person.upright = (
             person.upright
-            or (account.settled and person_sized(seen))
+            or (account.settled and person_sized(seen, view.top))
             or upright(seen, scene.view.intrinsics, view.top)
         )
         if view.top is not None and view.top > 1.2:

@@ -53,6 +53,11 @@ SLIM = 0.85
 broad as high is furniture."""
 FILL = 0.45
 """Share of the box that a body fills, at the least: a rack or a plant fills less."""
+NEAR = 0.4
+"""Metres of a head and shoulders, all that a camera may show of who passes close to it."""
+HEADED = 1.45
+"""Metres above the floor of a figure's upper end from which its head shows, even where the image
+or something nearer begins there."""
 LENGTH = (1.2, 0.8)
 """Metres of a person whose shape is not told: whole, a child of seven, and cut off above or below,
 as much as from head to hips."""
@@ -111,17 +116,25 @@ def _rows(wide: FloatArray, below: tuple[float, float], per_row: float) -> Float
     return wide[first : max(int(below[1] * per_row), first + 1)]
 
 
-def person_sized(seen: Silhouette) -> bool:
+def person_sized(seen: Silhouette, top: float | None) -> bool:
     """Whether a silhouette has the breadth and length of a person, if not the shape.
 
     That is enough for what has come to stand before a room that is known: somebody too near to the
-    camera for his head to show, or who stoops.
+    camera for his head to show, or for more than that, or who stoops.
+
+    Args:
+        seen: the silhouette.
+        top: metres of its upper end above the floor, None where no floor is known.
     """
-    cut_off = seen.cut.any
+    if not WIDTH[0] <= seen.width <= WIDTH[1]:
+        return False
+    cut = seen.cut
+    if cut.bottom and not (cut.top or cut.left or cut.right):
+        near = top is not None and HEADED < top <= TOP[1]
+        if near and seen.height > NEAR:
+            return True
     return (
-        LENGTH[cut_off] <= seen.height <= HEIGHT[1]
-        and WIDTH[0] <= seen.width <= WIDTH[1]
-        and seen.area >= FILL * seen.width * seen.height
+        LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.area >= FILL * seen.width * seen.height
     )
 
 
