@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import cv2
@@ -21,7 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.room import REACH, SETTLE, GoingOn, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import upright
+from rgbd_kcf_tracker.metric.perceive.upright import upright, upright_people
 from rgbd_kcf_tracker.pose import Pose
 
 NOBODY = np.zeros((ROWS, COLS), bool)
@@ -256,6 +257,40 @@ def goes_on(room: Room, depth: np.ndarray, large: bool = False) -> GoingOn:
     return room.going_on(depth, surfaces, np.full(len(surfaces), large), CAMERA, 0.1)
 
 
+AHEAD = Pose(np.eye(3), np.array([0.0, 0.0, -0.05]))
+
+
+def test_a_reading_unlike_all_about_it_is_not_learned_before_a_camera_that_moves():
+    """What is nearest is seen of the room: a speck of noise hid what was behind it for good."""
+    room = known_room(wall())
+    room.depth[:, 200:] = 0
+    room.moved(AHEAD, CAMERA)
+    noisy = wall(WALL - 0.05)
+    noisy[80, 220] = 0.9
+    see(room, noisy, 0.1, None)
+    assert room.depth[80, 220] == 0
+    assert (room.depth[60:100, 202:218] == noisy[60:100, 202:218]).all()
+
+
+def test_what_turns_out_to_be_farther_is_learned_before_a_camera_that_moves():
+    """It was asked of each frame alone, and what was hidden never became the room."""
+    room = known_room(with_thing())
+    for i in range(1, 5):
+        room.moved(AHEAD, CAMERA)
+        see(room, wall(WALL - 0.05 * i), 0.1, None)
+    assert room.depth[60:80, 70:80] == pytest.approx(WALL - 0.2, abs=0.05)
+    assert not room.before.any()
+
+
+def test_who_passed_for_the_room_is_told_by_his_shape_unless_he_stands_before_it():
+    room = known_room(with_thing())
+    people = NOBODY.copy()
+    people[THING] = True
+    surfaces = surfaces_in(with_thing(), with_thing() > 0, 0.04, 0.03)
+    assert (room.passing(people, with_thing(), surfaces) == people).all()
+    assert not known_room(wall()).passing(people, with_thing(), surfaces).any()
+
+
 def test_what_goes_on_from_somebody_as_one_surface_is_somebody():
     """Before a camera that moves, half of whom somebody else hid was taken for the room."""
     room = known_room(wall())
@@ -432,13 +467,38 @@ STILL = Pose(np.eye(3), np.zeros(3))
 )
 def test_the_cameras_motion_is_recovered(motion: Pose):
     ego = EgoMotion()
-    assert ego.update(*seen_by(STILL), NOBODY) is None
-    found = ego.update(*seen_by(motion), NOBODY)
+    assert ego.update(*seen_by(STILL), NOBODY, 0.1) is None
+    found = ego.update(*seen_by(motion), NOBODY, 0.1)
     assert isinstance(found, Pose)
     between = motion.after(found.inverse)
     angle = np.degrees(np.linalg.norm(cv2.Rodrigues(between.rotation)[0]))
     assert angle < 0.3
     assert np.linalg.norm(found.of(np.array([0, 0, 3.0])) - motion.of(np.array([0, 0, 3.0]))) < 0.03
+
+
+def test_a_camera_that_creeps_is_told_of_all_the_time_since_it_stood():
+    """A robot drove through a hall as if it stood: its far wall became a row of people."""
+    ego, been, told = EgoMotion(), STILL, []
+    step = turned(0, 0, 0, 0.0, 0.0, -0.012)
+    camera = STILL
+    for _ in range(25):
+        found = ego.update(*seen_by(camera), NOBODY, 0.1)
+        camera = step.after(camera)
+        assert not isinstance(found, Lost)
+        told.append(found is not None)
+        been = been if found is None else found.after(been)
+    assert not told[1]
+    assert 3 < sum(told) < 20, 'by a part of a pixel a frame nothing can be told'
+    assert been.translation == pytest.approx([0.0, 0.0, -0.012 * 24], abs=0.03)
+
+
+def test_who_walks_before_a_camera_that_stands_does_not_make_it_creep():
+    ego = EgoMotion()
+    image, view = seen_by(STILL)
+    for i in range(20):
+        walks = image.copy()
+        walks[30:140, 5 * i : 5 * i + 40] = texture(4)[30:140, 10:50]
+        assert ego.update(walks, view, NOBODY, 0.1) is None
 
 
 @pytest.mark.parametrize('seed', range(5))
@@ -451,20 +511,21 @@ def test_the_median_of_bytes_is_counted(seed: int):
 def test_a_camera_that_stands_still_has_not_moved_whoever_walks():
     ego = EgoMotion()
     image, view = seen_by(STILL)
-    ego.update(image, view, NOBODY)
+    ego.update(image, view, NOBODY, 0.1)
     noisy = np.clip(image + np.random.default_rng(0).normal(0, 3, image.shape), 0, 255)
-    assert ego.update(noisy.astype(np.uint8), view, NOBODY) is None
+    assert ego.update(noisy.astype(np.uint8), view, NOBODY, 0.1) is None
     walked = image.copy()
     walked[20:150, 60:130] = BLUE
-    assert ego.update(walked, view, NOBODY) is None
+    assert ego.update(walked, view, NOBODY, 0.1) is None
 
 
 def test_a_change_of_light_is_no_motion():
     ego = EgoMotion()
     image, view = seen_by(STILL)
-    ego.update(image, view, NOBODY)
+    ego.update(image, view, NOBODY, 0.1)
     assert (
-        ego.update(np.clip(image.astype(int) + 30, 0, 255).astype(np.uint8), view, NOBODY) is None
+        ego.update(np.clip(image.astype(int) + 30, 0, 255).astype(np.uint8), view, NOBODY, 0.1)
+        is None
     )
 
 
@@ -479,22 +540,22 @@ def test_who_steps_before_a_camera_and_changes_its_exposure_does_not_move_it(see
     rng = np.random.default_rng(seed)
     ego = EgoMotion()
     image, view = seen_by(STILL)
-    ego.update(image, view, NOBODY)
+    ego.update(image, view, NOBODY, 0.1)
     covered = image.copy()
     left = rng.integers(0, COLS // 2)
     covered[:, left : left + COLS // 3] = texture(20 + seed)[:, : COLS // 3]
     covered = np.clip(covered * 1.15 + rng.normal(0, 4, covered.shape), 0, 255).astype(np.uint8)
-    assert not isinstance(ego.update(covered, view, NOBODY), Pose)
+    assert not isinstance(ego.update(covered, view, NOBODY, 0.1), Pose)
 
 
 def test_a_cut_to_something_else_is_said_to_be_lost():
     ego = EgoMotion()
     image, view = seen_by(STILL)
-    ego.update(image, view, NOBODY)
-    assert isinstance(ego.update(texture(9), view, NOBODY), Lost)
+    ego.update(image, view, NOBODY, 0.1)
+    assert isinstance(ego.update(texture(9), view, NOBODY, 0.1), Lost)
     ego = EgoMotion()
-    ego.update(np.full_like(image, 40), view, NOBODY)
-    assert isinstance(ego.update(image, view, NOBODY), Lost), 'nothing to follow'
+    ego.update(np.full_like(image, 40), view, NOBODY, 0.1)
+    assert isinstance(ego.update(image, view, NOBODY, 0.1), Lost), 'nothing to follow'
 
 
 def test_poses_that_are_given_are_taken_before_what_seems():
@@ -761,6 +822,28 @@ def test_somebody_who_waves_is_one():
     assert scene is not None
     (figure,) = find_figures(scene, NONE_EXPECTED)
     assert outline(figure.seen).iou(one.box) > 0.6
+
+
+def test_a_piece_of_the_ceiling_is_no_figure():
+    scene = scene_of([Someone(0.0, 3.0)])
+    row = np.arange(ROWS, dtype=np.float32)[:, None] + np.zeros((1, COLS), np.float32)
+    for floor, people in ((1.3, 1), (3.5, 0)):
+        elevation = np.float32(floor) - (row - CAMERA.cy) * 3.0 / CAMERA.fy
+        above = dataclasses.replace(scene, elevation=elevation.astype(np.float32))
+        assert len(find_figures(above, NONE_EXPECTED)) == people
+
+
+def test_the_tall_are_told_apart_from_those_whose_shape_alone_says_so():
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+    scene = reader.read(picture([Someone(0.0, 3.0)], 0.0), 0.0)
+    assert scene is not None
+    for above, tall in ((2.0, True), (1.25, False)):
+        elevation = np.full((ROWS, COLS), above, np.float32)
+        found = upright_people(
+            scene.view, scene.surfaces, elevation, scene.forward, scene.axes[0], Rim()
+        )
+        assert found.mask.any()
+        assert found.tall.any() == tall
 
 
 def test_what_is_too_small_for_anybody_is_no_figure():

@@ -259,7 +259,7 @@ def _motion(first: Frame, then: Frame) -> Pose | None:
         view = DepthView.of(frame, VIEW)
         assert view is not None
         image = view_image(frame.color, view.step, view.shape)
-        motion = told.update(image, view, np.zeros(view.shape, np.bool_))
+        motion = told.update(image, view, np.zeros(view.shape, np.bool_), 0.0)
     return None if isinstance(motion, Lost) else motion or Pose(np.eye(3), np.zeros(3))
 
 

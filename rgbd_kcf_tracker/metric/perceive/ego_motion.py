@@ -27,6 +27,8 @@ from rgbd_kcf_tracker.pose import Pose
 GrayImage = npt.NDArray[np.uint8]
 Points = npt.NDArray[np.floating]
 
+NEAREST = 0.05
+"""Metres ahead of the camera at the least, so that a wild motion divides by nothing."""
 CHANGED = 14
 CHANGED_SHARE = 0.06
 """Grey values by which a pixel must change to have changed, and the share of such pixels from which
@@ -53,11 +55,39 @@ fit of :data:`ITERATIONS` hardly finds that, as it begins with this scale."""
 STILL, LEAST_STILL = 0.3, 0.35
 """Pixels of flow up to which a corner stands still, and the share of them from which the camera
 does: somebody may have stepped before the others."""
+CREPT, FORGOTTEN = 0.3, 0.6
+"""Seconds after which it is asked whether a camera that seems to stand has crept, and seconds for
+which the picture is kept with which that is told: a robot that drives through a hall at the pace of
+a walk moves what is ahead by a part of a pixel a frame, and in half a second by some."""
+STANDS = 3.0
+"""Seconds for which that is asked in every frame once it has crept."""
+CREEPS, CREEPING = 0.7, 0.15
+"""Pixels by which a corner has moved for good, thrice what flow is uncertain by, and the share of
+corners that must have, as the motion tells: what is far ahead of a robot hardly moves."""
+LEAST_CREEPING = LEAST_CORNERS // 2
+"""Corners of these at the least: as many equations as a motion has unknowns, twice."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lost:
     """The camera has moved, and nothing tells how."""
+
+
+@dataclass(slots=True)
+class _Anchor:
+    """A picture from which a camera has not moved, as far as is known.
+
+    Attributes:
+        gray: ``(h, w)`` uint8.
+        view: the depth.
+        corners: ``(n, 2)`` float32, of what stands before nobody.
+        age: seconds since.
+    """
+
+    gray: GrayImage
+    view: DepthView
+    corners: Points
+    age: float = 0.0
 
 
 class EgoMotion:
@@ -66,9 +96,16 @@ class EgoMotion:
     def __init__(self) -> None:
         self._gray: GrayImage | None = None
         self._view: DepthView | None = None
+        self._anchor: _Anchor | None = None
+        self._unasked = 0.0
+        self._since_crept = math.inf
 
     def update(
-        self, image: npt.NDArray[np.uint8], view: DepthView, others: npt.NDArray[np.bool_]
+        self,
+        image: npt.NDArray[np.uint8],
+        view: DepthView,
+        others: npt.NDArray[np.bool_],
+        seconds: float,
     ) -> Pose | Lost | None:
         """The motion since the last view: the pose of the last camera's frame in that of now.
 
@@ -76,18 +113,38 @@ class EgoMotion:
             image: ``(h, w, 3)`` BGR at the view's resolution.
             view: the depth.
             others: ``(h, w)`` bool, pixels of the last view that showed what may move by itself.
+            seconds: since the last view.
 
         Returns:
-            None where the camera stands still.
+            None where the camera stands still, or creeps by less than can be told yet: that is
+            told later, of all the time since it stood.
         """
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         last, last_view = self._gray, self._view
         self._gray, self._view = gray, view
         if last is None or last_view is None or last.shape != gray.shape:
             return None
-        if not changed(last, gray):
+        motion = _told(last, last_view, gray, others) if changed(last, gray) else None
+        self._since_crept += seconds
+        if motion is not None:
+            self._anchor = None
+            return motion
+        if self._anchor is None or self._anchor.age > FORGOTTEN:
+            self._anchor = _Anchor(last, last_view, _corners(last, (last_view.depth > 0) & ~others))
+            self._unasked = 0.0
+        return self._crept(self._anchor, gray, seconds)
+
+    def _crept(self, anchor: _Anchor, gray: GrayImage, seconds: float) -> Pose | None:
+        """How the camera has moved since a picture, None where it has not, or not told yet."""
+        anchor.age += seconds
+        self._unasked += seconds
+        if self._unasked < CREPT and self._since_crept > STANDS:
             return None
-        return _told(last, last_view, gray, others)
+        self._unasked = 0.0
+        motion = _crept(anchor, gray)
+        if motion is not None:
+            self._anchor, self._since_crept = None, 0.0
+        return motion
 
 
 def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | None = None) -> bool:
@@ -122,14 +179,19 @@ def corners_between(
     Returns:
         None where there are too few.
     """
-    corners = cv2.goodFeaturesToTrack(
-        last, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
-    )
-    if corners is None or len(corners) < LEAST_CORNERS:
+    corners = _corners(last, usable)
+    if len(corners) < LEAST_CORNERS:
         return None
-    corners = corners.reshape(-1, 2)
     found, good = followed(last, gray, corners)
     return corners[good], found[good]
+
+
+def _corners(gray: GrayImage, usable: npt.NDArray[np.bool_]) -> Points:
+    """The strongest corners of a picture, ``(n, 2)`` float32, where they are usable."""
+    corners = cv2.goodFeaturesToTrack(
+        gray, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
+    )
+    return np.zeros((0, 2), np.float32) if corners is None else corners.reshape(-1, 2)
 
 
 def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> bool:
@@ -191,6 +253,39 @@ def _told(
     return Lost() if motion is None else motion
 
 
+def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
+    """The motion since a picture where corners that have moved for good bear it out."""
+    if len(anchor.corners) < LEAST_CORNERS:
+        return None
+    found, good = followed(anchor.gray, gray, anchor.corners)
+    first, second = anchor.corners[good].astype(np.float64), found[good].astype(np.float64)
+    least = max(LEAST_CREEPING, CREEPING * len(first))
+    moved = np.hypot(*(second - first).T)
+    if len(first) < LEAST_CORNERS or np.count_nonzero(moved > CREEPS) < least:
+        return None
+    motion = _agreed(first, second, anchor.view, np.zeros(3))
+    if motion is None:
+        return None
+    k = anchor.view.intrinsics
+    off = np.hypot(*(_projected(motion.of(_points(first, anchor.view)), k) - second).T)
+    told = (moved > CREEPS) & (off < 0.5 * moved)
+    return motion if np.count_nonzero(told) >= least else None
+
+
+def _points(pixels: FloatArray, view: DepthView) -> FloatArray:
+    """Pixels of a view, ``(n, 2)``, as points of its camera in metres, ``(n, 3)``."""
+    k = view.intrinsics
+    z = view.depth[pixels[:, 1].astype(int), pixels[:, 0].astype(int)].astype(np.float64)
+    return np.stack(((pixels[:, 0] - k.cx) * z / k.fx, (pixels[:, 1] - k.cy) * z / k.fy, z), axis=1)
+
+
+def _projected(points: FloatArray, k: Intrinsics) -> FloatArray:
+    """Points in metres, ``(n, 3)``, as pixels, ``(n, 2)``."""
+    x, y, z = points.T
+    z = np.maximum(z, NEAREST)
+    return np.stack((x * k.fx / z + k.cx, y * k.fy / z + k.cy), axis=1)
+
+
 def _agreed(
     first: FloatArray, second: FloatArray, view: DepthView, turn: FloatArray
 ) -> Pose | None:
@@ -202,15 +297,10 @@ def _agreed(
         view: the depth before.
         turn: ``(3,)`` radians about each axis from which the motion is fitted.
     """
-    k = view.intrinsics
-    z = view.depth[first[:, 1].astype(int), first[:, 0].astype(int)].astype(np.float64)
-    points = np.stack(((first[:, 0] - k.cx) * z / k.fx, (first[:, 1] - k.cy) * z / k.fy, z), axis=1)
-    motion = _fitted(points, second, k, turn)
-    moved = motion.of(points)
-    ahead = np.maximum(moved[:, 2], 0.05)
-    u = moved[:, 0] * k.fx / ahead + k.cx
-    v = moved[:, 1] * k.fy / ahead + k.cy
-    agreeing = np.count_nonzero(np.hypot(u - second[:, 0], v - second[:, 1]) < AGREE)
+    points = _points(first, view)
+    motion = _fitted(points, second, view.intrinsics, turn)
+    off = _projected(motion.of(points), view.intrinsics) - second
+    agreeing = np.count_nonzero(np.hypot(*off.T) < AGREE)
     return motion if agreeing >= max(LEAST_CORNERS, LEAST_AGREEING * len(points)) else None
 
 
@@ -219,9 +309,10 @@ def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatA
     rotation, shift = cv2.Rodrigues(start)[0], np.zeros(3)
     scale = FAR
     for _ in range(ITERATIONS):
-        x, y, z = (points @ rotation.T + shift).T
-        z = np.maximum(z, 0.05)
-        error = np.stack((x * k.fx / z + k.cx, y * k.fy / z + k.cy), axis=1) - pixels
+        moved = points @ rotation.T + shift
+        error = _projected(moved, k) - pixels
+        x, y, z = moved.T
+        z = np.maximum(z, NEAREST)
         weight = 1 / (1 + np.square(error).sum(axis=1) / scale**2)
         zero = np.zeros_like(z)
         # Of the projection by a small turn (three) and shift (three) of the moved points.

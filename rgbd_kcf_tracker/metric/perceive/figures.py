@@ -35,6 +35,9 @@ LEAST_HEIGHT = 0.35
 LEAST_TOP = 0.6
 """Metres above the floor that a figure reaches: what is lower is no person, not even a seated
 one."""
+FLOATS = 1.3
+"""Metres above the floor from which a figure under which nothing hides more of it is nobody, but a
+piece of the ceiling: dark trousers may give no reading, and hips are at 0.9 m."""
 DEPTH_STEP, DEPTH_STEP_PER_METRE = 0.25, 0.03
 """Metres in depth between two pieces of one person: an arm's reach, and the sensor's noise."""
 GAP_ABOVE, GAP_BESIDE = 0.35, 0.05
@@ -168,6 +171,9 @@ def makes_figure(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette that stands before the room is large and high enough for a figure."""
     cut_off = seen.cut.any
     if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
+        return False
+    lowest = None if seen.cut.bottom else seen.lowest(scene.elevation)
+    if lowest is not None and lowest > FLOATS:
         return False
     highest = seen.highest(scene.elevation)
     return highest is None or highest >= LEAST_TOP

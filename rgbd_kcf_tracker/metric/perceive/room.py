@@ -178,6 +178,7 @@ class Room:
         self._still: DepthArray = self.depth
         self._still_for: DepthArray = self.depth
         self._unlearned = 0.0
+        self._has_moved = False
 
     def restart(self, depth: DepthArray, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -197,6 +198,23 @@ class Room:
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
+
+    def passing(self, people: Mask, depth: DepthArray, surfaces: Surfaces) -> Mask:
+        """Those of people's pixels, ``(h, w)`` bool, whose surface does not stand before the room.
+
+        They passed for the room as they were first seen.
+
+        Args:
+            people: pixels of surfaces.
+            depth: ``(h, w)`` metres of a view.
+            surfaces: of it.
+        """
+        nearer = people & (self.depth > 0) & (self.depth - depth > tolerance(depth))
+        theirs, before = (
+            np.bincount(surfaces.labels[each], minlength=len(surfaces)) for each in (people, nearer)
+        )
+        result: Mask = people & (before < MOST * theirs)[surfaces.labels]
+        return result
 
     def agrees(self, depth: DepthArray) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
@@ -222,9 +240,10 @@ class Room:
         unknown = self.depth == 0
         opened = unknown & (self._front > 0)
         self._blind = np.where(opened, np.uint8(BLIND_FRAMES), np.uint8(0))
-        self._farther = np.zeros_like(self.depth)
+        self._farther = _seen_from(self._farther, motion, k)
         self._still_for = np.zeros_like(self.depth)
         self._stood = np.zeros_like(self.depth)
+        self._has_moved = True
         lost: Mask = unknown & ~opened
         return lost
 
@@ -318,6 +337,7 @@ class Room:
                 None for none.
         """
         self._time += dt
+        has_moved, self._has_moved = self._has_moved, False
         valid = depth > 0
         known = self.depth > 0
         allowed = tolerance(depth)
@@ -334,6 +354,9 @@ class Room:
         new &= ~before
         if undecided is not None:
             new &= ~undecided
+        if has_moved:
+            # A reading unlike all about it is noise, and would hide what is behind it from then on.
+            new &= np.abs(depth - cv2.medianBlur(depth, 3)) <= allowed
         np.copyto(self.depth, depth, where=new)
         self._blind *= ~both
         missing = (~valid).view(np.uint8)

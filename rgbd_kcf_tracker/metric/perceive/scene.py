@@ -146,7 +146,7 @@ class SceneReader:
         # Where frames come fast, looks are learned from another one than the room: none takes long.
         teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
         image = view_image(frame.color, view.step, view.shape)
-        motion = self._move(image, view, frame.pose)
+        motion = self._move(image, view, frame.pose, seconds)
         if isinstance(motion, Lost) and self.room.agrees(view.depth):
             motion = None
         floor = (
@@ -167,7 +167,7 @@ class SceneReader:
         fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if fresh:
             people = upright_people(view, surfaces, elevation, forward, axes[0], self._rim)
-            self.room.restart(view.depth, people)
+            self.room.restart(view.depth, people.mask)
             self._light.restart()
         else:
             somebody, undecided = self.somebody, None
@@ -178,8 +178,9 @@ class SceneReader:
                 )
                 large = _large(Sizes.of(surfaces, view.intrinsics))
                 going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
-                people |= going_on.somebody
-                self.room.open(people & unknown, view.depth)
+                opened = (people.mask | going_on.somebody) & unknown
+                opened |= self.room.passing(people.tall, view.depth, surfaces)
+                self.room.open(opened, view.depth)
                 # Whose other side comes into view next may be somebody or something, and so may
                 # be what somebody touches.
                 undecided = _at_side(view, surfaces, self._rim, large) | going_on.beyond
@@ -228,14 +229,14 @@ class SceneReader:
         return self.room.goes_on(mask, scene.view.depth, scene.surfaces, _large(scene.sizes))
 
     def _move(
-        self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None
+        self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None, seconds: float
     ) -> Pose | Lost | None:
         """How the camera has moved: by its poses where both frames have one, else as it seems."""
         last = self._pose
         before = self.room.before
         if before.shape != view.shape:
             before = np.zeros(view.shape, np.bool_)
-        seems = self._ego.update(image, view, before)
+        seems = self._ego.update(image, view, before, seconds)
         self.seems = seems if isinstance(seems, Pose) else None
         if last is None or now is None:
             self._pose = now

@@ -141,6 +141,12 @@ class Silhouette:
             return None
         return _upper_end(elevation[self.rows, self.cols][self.mask])
 
+    def lowest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
+        """Metres above the floor of the lower end, None where no floor is known; see `highest`."""
+        if elevation is None:
+            return None
+        return -_upper_end(-elevation[self.rows, self.cols][self.mask])
+
     def same(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view has the same pixels."""
         return self is other or (

@@ -8,6 +8,7 @@ For a person who has not moved yet nothing else tells them from furniture.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
@@ -53,6 +54,9 @@ SLIM = 0.85
 broad as high is furniture."""
 FILL = 0.45
 """Share of the box that a body fills, at the least: a rack or a plant fills less."""
+GROWN = 1.3
+"""Metres above the floor of the top of whoever is told from furniture that was there before:
+chairs, and desks with what stands on them, end below."""
 NEAR = 0.4
 """Metres of a head and shoulders, all that a camera may show of who passes close to it."""
 HEADED = 1.45
@@ -138,6 +142,20 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
     )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class UprightPeople:
+    """What has a person's shape: pixels of a view.
+
+    Attributes:
+        mask: ``(h, w)`` bool, of all.
+        tall: ``(h, w)`` bool, of those alone who are a surface of their own, as long as a child of
+            seven and higher than furniture: of what stands in a room, little else is.
+    """
+
+    mask: npt.NDArray[np.bool_]
+    tall: npt.NDArray[np.bool_]
+
+
 def upright_people(
     view: DepthView,
     surfaces: Surfaces,
@@ -146,8 +164,8 @@ def upright_people(
     right: FloatArray,
     rim: Rim,
     whole: bool = False,
-) -> npt.NDArray[np.bool_]:
-    """The pixels of all surfaces and parts of them that have a person's shape, ``(h, w)`` bool.
+) -> UprightPeople:
+    """All surfaces and parts of them that have a person's shape.
 
     Args:
         view: the depth.
@@ -169,6 +187,7 @@ def upright_people(
     # Two chairs beside each other have two heads as well.
     several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
     people = np.zeros(view.shape, np.bool_)
+    tall_ones = np.zeros(view.shape, np.bool_)
     for label in np.flatnonzero(possible & (one | several)):
         left, upper, width, height = (int(v) for v in surfaces.boxes[label])
         mask = surfaces.labels[upper : upper + height, left : left + width] == label
@@ -188,4 +207,7 @@ def upright_people(
             if whole and seen.at_side(view, rim):
                 continue
             people[seen.rows, seen.cols] |= seen.mask
-    return people
+            top = seen.highest(elevation)
+            if one[label] and seen.height >= LENGTH[0] and (top is None or top > GROWN):
+                tall_ones[seen.rows, seen.cols] |= seen.mask
+    return UprightPeople(people, tall_ones)
