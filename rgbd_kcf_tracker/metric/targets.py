@@ -150,6 +150,7 @@ class MetricTargets:
     def settle(self) -> None:
         """Do what was put off, see :attr:`puts_off`."""
         self._learn()
+        self._reader.settle()
         for follower in self._followers.values():
             follower.settle()
 

@@ -59,6 +59,8 @@ CREPT, FORGOTTEN = 0.3, 0.6
 """Seconds after which it is asked whether a camera that seems to stand has crept, and seconds for
 which the picture is kept with which that is told: a robot that drives through a hall at the pace of
 a walk moves what is ahead by a part of a pixel a frame, and in half a second by some."""
+FAST = 0.045
+"""Seconds between frames below which that is asked after the answer, and told a frame later."""
 STANDS = 3.0
 """Seconds for which that is asked in every frame once it has crept."""
 CREEPS, CREEPING = 0.7, 0.15
@@ -80,14 +82,16 @@ class _Anchor:
     Attributes:
         gray: ``(h, w)`` uint8.
         view: the depth.
-        corners: ``(n, 2)`` float32, of what stands before nobody.
+        others: ``(h, w)`` bool, pixels that show what may move by itself.
         age: seconds since.
+        corners: ``(n, 2)`` float32 of what stands there; None until they are looked for.
     """
 
     gray: GrayImage
     view: DepthView
-    corners: Points
+    others: npt.NDArray[np.bool_]
     age: float = 0.0
+    corners: Points | None = None
 
 
 class EgoMotion:
@@ -97,6 +101,7 @@ class EgoMotion:
         self._gray: GrayImage | None = None
         self._view: DepthView | None = None
         self._anchor: _Anchor | None = None
+        self._asks = False
         self._unasked = 0.0
         self._since_crept = math.inf
 
@@ -122,29 +127,41 @@ class EgoMotion:
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         last, last_view = self._gray, self._view
         self._gray, self._view = gray, view
+        self._asks = False
         if last is None or last_view is None or last.shape != gray.shape:
+            self._anchor = None
             return None
         motion = _told(last, last_view, gray, others) if changed(last, gray) else None
         self._since_crept += seconds
+        self._unasked += seconds
         if motion is not None:
             self._anchor = None
             return motion
         if self._anchor is None or self._anchor.age > FORGOTTEN:
-            self._anchor = _Anchor(last, last_view, _corners(last, (last_view.depth > 0) & ~others))
-            self._unasked = 0.0
-        return self._crept(self._anchor, gray, seconds)
-
-    def _crept(self, anchor: _Anchor, gray: GrayImage, seconds: float) -> Pose | None:
-        """How the camera has moved since a picture, None where it has not, or not told yet."""
-        anchor.age += seconds
-        self._unasked += seconds
-        if self._unasked < CREPT and self._since_crept > STANDS:
-            return None
+            self._anchor = _Anchor(last, last_view, others)
+            self._unasked = seconds
+        self._anchor.age += seconds
+        if self._since_crept > STANDS:
+            asks = self._unasked >= CREPT
+            self._asks = asks and seconds < FAST
+            if not asks or self._asks:
+                return None
         self._unasked = 0.0
-        motion = _crept(anchor, gray)
-        if motion is not None:
+        crept = _crept(self._anchor, gray)
+        if crept is not None:
             self._anchor, self._since_crept = None, 0.0
-        return motion
+        return crept
+
+    def settle(self) -> None:
+        """Ask whether a camera that stood creeps, so that the next :meth:`update` tells how far.
+
+        Apart from it where frames come fast, as an answer need not wait for that.
+        """
+        if not self._asks or self._anchor is None or self._gray is None:
+            return
+        self._asks, self._unasked = False, 0.0
+        if _crept(self._anchor, self._gray) is not None:
+            self._since_crept = 0.0
 
 
 def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | None = None) -> bool:
@@ -255,6 +272,8 @@ def _told(
 
 def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
     """The motion since a picture where corners that have moved for good bear it out."""
+    if anchor.corners is None:
+        anchor.corners = _corners(anchor.gray, (anchor.view.depth > 0) & ~anchor.others)
     if len(anchor.corners) < LEAST_CORNERS:
         return None
     found, good = followed(anchor.gray, gray, anchor.corners)

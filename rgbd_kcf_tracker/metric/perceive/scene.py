@@ -211,6 +211,10 @@ class SceneReader:
             since,
         )
 
+    def settle(self) -> None:
+        """Do what an answer need not wait for."""
+        self._ego.settle()
+
     def is_somebody(self, seen: Silhouette) -> None:
         """Take the pixels of a silhouette of the last scene out of what stands still."""
         if self.last_view is not None:
