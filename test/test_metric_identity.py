@@ -397,6 +397,29 @@ def test_a_head_and_shoulders_above_the_images_end_are_somebody_near(
     assert person_sized(seen, top) == sized
 
 
+@pytest.mark.parametrize(
+    ('moves', 'top', 'told'), [(False, 0.95, True), (True, 0.95, False), (True, 1.7, True)]
+)
+def test_what_is_of_a_persons_size_has_come_there_unless_a_camera_that_moves_sees_it_anew(
+    moves: bool, top: float, told: bool
+):
+    """A pillar and a chair were people as a camera turned and they came out from behind one."""
+    reader, crowd = SceneReader(COLS, 0.04, 0.03, 0.0), Crowd()
+    for i in range(1, 8):
+        color, depth = images([])
+        if i > 5:
+            depth[60:150, :30] = 2.0  # as high as a desk, and cut off at the side
+        scene = reader.read(Frame(color, depth, round(1e8 * i), CAMERA), 0.1)
+        assert scene is not None
+        rows = np.arange(ROWS, dtype=np.float32)[:, None] - 60
+        elevation = np.float32(top) - rows * 2 / CAMERA.fy + np.zeros((1, COLS), np.float32)
+        motion = Pose(np.eye(3), np.zeros(3)) if moves else None
+        scene = dataclasses.replace(scene, elevation=elevation, motion=motion)
+        account = crowd.explain(scene, 0.1 * i)
+        crowd.learn(account, {})
+    assert who(account, 0).upright == told
+
+
 def test_a_person_stays_in_the_world_while_the_camera_turns():
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     one.moved_to(np.array([0.1, 3.0]), 0.1)

@@ -33,7 +33,13 @@ from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figur
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import HEADED, TOP, person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import (
+    GROWN,
+    HEADED,
+    TOP,
+    person_sized,
+    upright,
+)
 from rgbd_kcf_tracker.pose import Pose
 
 NEW = 0.0
@@ -816,7 +822,7 @@ class Crowd:
                 return
         person.upright = (
             person.upright
-            or (account.settled and person_sized(seen, view.top))
+            or (account.settled and person_sized(seen, view.top) and _came(scene, seen))
             or upright(seen, scene.view.intrinsics, view.top)
         )
         if view.top is not None and view.top > 1.2:
@@ -828,6 +834,15 @@ class Crowd:
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
             person.gallery.learn(view, account.time)
+
+
+def _came(scene: Scene, seen: Silhouette) -> bool:
+    """Whether what stands before the room has come there, as far as a camera that moves can tell.
+
+    Furniture that it sees anew stands where something nearer, or farther, was known to be.
+    """
+    highest = None if scene.motion is None else seen.highest(scene.elevation)
+    return highest is None or highest > GROWN
 
 
 def _is_head(account: Account, column: int) -> bool:
