@@ -45,6 +45,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
 )
 from rgbd_kcf_tracker.metric.decide.crowd import (
     MOST_PEOPLE,
+    NEW,
     NEW_AREA,
     REUNION,
     SMALL,
@@ -418,6 +419,32 @@ def test_what_is_of_a_persons_size_has_come_there_unless_a_camera_that_moves_see
         account = crowd.explain(scene, 0.1 * i)
         crowd.learn(account, {})
     assert who(account, 0).upright == told
+
+
+@pytest.mark.parametrize(
+    ('moves', 'known', 'may_be'), [(True, 1.7, False), (True, 1.2, True), (False, 1.7, True)]
+)
+def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(
+    moves: bool, known: float, may_be: bool
+):
+    """Who had gone out of view was taken for a table before which nobody stood any more."""
+    reader, crowd = SceneReader(COLS, 0.04, 0.03, 0.0), Crowd()
+    person = crowd.welcome(np.array([-1.1, 2.0]), 0.0)
+    person.gallery.learn_height(known, 0.0)
+    for i in range(1, 9):
+        color, depth = images([])
+        if i > 7:
+            depth[60:150, :30] = 2.0
+        scene = reader.read(Frame(color, depth, round(1e8 * i), CAMERA), 0.1)
+        assert scene is not None
+        rows = np.arange(ROWS, dtype=np.float32)[:, None] - 60
+        elevation = 0.9 - rows * 2 / CAMERA.fy + np.zeros((1, COLS), np.float32)
+        motion = Pose(np.eye(3), np.zeros(3)) if moves else None
+        scene = dataclasses.replace(scene, elevation=elevation, motion=motion)
+        account = crowd.explain(scene, 0.1 * i)
+        odds = account.odds.copy()
+        crowd.learn(account, {})
+    assert (odds[0, 0] > NEW) == may_be
 
 
 def test_a_person_stays_in_the_world_while_the_camera_turns():

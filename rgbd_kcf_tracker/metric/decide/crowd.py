@@ -526,7 +526,7 @@ class Crowd:
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
         )
-        odds, looks, alike = self._odds(sights, time, against)
+        odds, looks, alike = self._odds(scene, sights, time, against)
         account = Account(
             scene,
             time,
@@ -587,7 +587,7 @@ class Crowd:
             newcomer.again = newcomer.seen_before(new)
 
     def _odds(
-        self, sights: list[Sight], time: float, against: float
+        self, scene: Scene, sights: list[Sight], time: float, against: float
     ) -> tuple[FloatArray, FloatArray, Likeness]:
         odds = np.zeros((len(self.people), len(sights)))
         looks = np.zeros_like(odds)
@@ -604,6 +604,7 @@ class Crowd:
             best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
         rows = iter(best)
         places = np.stack([s.figure.place for s in sights])
+        low = np.array([not _came(scene, s.figure.seen) for s in sights])
         for row, person in enumerate(self.people):
             likeness = next(rows) if person.gallery.looks is not None else None
             for column, sight in enumerate(sights):
@@ -615,6 +616,8 @@ class Crowd:
                 odds[row] += np.minimum(looks[row], OF_TWO + gone)
             else:
                 odds[row] += looks[row] - (against + SAME_AGAIN) * gone
+            if low.any() and time - person.seen_at > RECENT and (person.gallery.top or 0.0) > GROWN:
+                odds[row, low] = NEW - 1  # nor does he come back as a desk
         return odds, looks, alike
 
     def _joined(self, known: list[Looks]) -> Looks:
