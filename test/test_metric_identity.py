@@ -414,8 +414,8 @@ def test_what_is_of_a_persons_size_has_come_there_unless_a_camera_that_moves_see
         assert scene is not None
         rows = np.arange(ROWS, dtype=np.float32)[:, None] - 60
         elevation = np.float32(top) - rows * 2 / CAMERA.fy + np.zeros((1, COLS), np.float32)
-        motion = Pose(np.eye(3), np.zeros(3)) if moves else None
-        scene = dataclasses.replace(scene, elevation=elevation, motion=motion)
+        stood_for = 0.5 if moves else 5.0
+        scene = dataclasses.replace(scene, elevation=elevation, stood_for=stood_for)
         account = crowd.explain(scene, 0.1 * i)
         crowd.learn(account, {})
     assert who(account, 0).upright == told
@@ -439,8 +439,8 @@ def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(
         assert scene is not None
         rows = np.arange(ROWS, dtype=np.float32)[:, None] - 60
         elevation = 0.9 - rows * 2 / CAMERA.fy + np.zeros((1, COLS), np.float32)
-        motion = Pose(np.eye(3), np.zeros(3)) if moves else None
-        scene = dataclasses.replace(scene, elevation=elevation, motion=motion)
+        stood_for = 0.5 if moves else 5.0
+        scene = dataclasses.replace(scene, elevation=elevation, stood_for=stood_for)
         account = crowd.explain(scene, 0.1 * i)
         odds = account.odds.copy()
         crowd.learn(account, {})

@@ -107,6 +107,9 @@ everybody away, as it did at 0.97."""
 MISSES = 2
 """Frames in which somebody was not found that are no chance: one may be blurred, or lost on the
 way."""
+AT_REST = 1.0
+"""Seconds for which a camera must have stood for what comes before the room to have come: one that
+turns to and fro stands for a moment each time."""
 RECENT = 0.6
 """Seconds after the last sight for which a figure is parted where somebody is expected: some frames
 at 5 Hz. By then a walker may be a metre from there, and who is not there is not to cut another."""
@@ -840,11 +843,11 @@ class Crowd:
 
 
 def _came(scene: Scene, seen: Silhouette) -> bool:
-    """Whether what stands before the room has come there, as far as a camera that moves can tell.
+    """Whether what stands before the room has come there, as far as a camera that moved can tell.
 
-    Furniture that it sees anew stands where something nearer, or farther, was known to be.
+    Furniture that it saw anew stands where something nearer, or farther, was known to be.
     """
-    highest = None if scene.motion is None else seen.highest(scene.elevation)
+    highest = seen.highest(scene.elevation) if scene.stood_for < AT_REST else None
     return highest is None or highest > GROWN
 
 

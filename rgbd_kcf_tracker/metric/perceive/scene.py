@@ -56,6 +56,7 @@ class Scene:
         codes: of its colours.
         motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
             where it has moved and nothing tells how.
+        stood_for: seconds for which the camera has stood still, 0 while it moves.
         since: seconds since the last one from which looks and sizes were learned; None where
             nothing is to be learned from this one but where everybody is, see
             :data:`LEARNING_STEP`.
@@ -74,6 +75,7 @@ class Scene:
     image: npt.NDArray[np.uint8]
     codes: ColorCodes
     motion: Pose | Lost | None
+    stood_for: float
     since: float | None
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
@@ -208,6 +210,7 @@ class SceneReader:
             image,
             ColorCodes(image),
             motion,
+            self.stood_for,
             since,
         )
 
