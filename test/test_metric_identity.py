@@ -422,6 +422,36 @@ def test_what_is_of_a_persons_size_has_come_there_unless_a_camera_that_moves_see
 
 
 @pytest.mark.parametrize(
+    ('stood_for', 'top', 'cut_off', 'walks'),
+    [
+        (0.5, 1.7, False, True),
+        (0.5, 1.7, True, False),
+        (0.5, 1.0, False, False),
+        (5.0, 1.7, True, True),
+        (5.0, 1.0, False, True),
+    ],
+)
+def test_what_a_camera_that_moves_sees_more_and_more_of_does_not_walk(
+    stood_for: float, top: float, cut_off: bool, walks: bool
+):
+    """A table that came out from behind one seemed to go a metre, and was somebody."""
+    reader, crowd = SceneReader(COLS, 0.04, 0.03, 0.0), Crowd()
+    for i in range(1, 14):
+        color, depth = images([])
+        right = 50 + 10 * max(i - 6, 0)
+        if i > 5:
+            depth[60:150, 0 if cut_off else right - 40 : right] = 2.0
+        scene = reader.read(Frame(color, depth, round(1e8 * i), CAMERA), 0.1)
+        assert scene is not None
+        rows = np.arange(ROWS, dtype=np.float32)[:, None] - 60
+        elevation = np.float32(top) - rows * 2 / CAMERA.fy + np.zeros((1, COLS), np.float32)
+        scene = dataclasses.replace(scene, elevation=elevation, stood_for=stood_for)
+        account = crowd.explain(scene, 0.1 * i)
+        crowd.learn(account, {})
+    assert (who(account, 0).travelled > 0.3) == walks
+
+
+@pytest.mark.parametrize(
     ('moves', 'known', 'may_be'), [(True, 1.7, False), (True, 1.2, True), (False, 1.7, True)]
 )
 def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(

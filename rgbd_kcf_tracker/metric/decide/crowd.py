@@ -800,7 +800,9 @@ class Crowd:
             if person.gallery.views and not person.chosen:
                 self._came_back(person, person.came, account.against)
         if gone > 0:
-            person.moved_to(place, account.time)
+            # What comes into view, or out from behind something, seems to walk as more of it shows.
+            walks = scene.stood_for >= AT_REST or (not seen.cut.any and _came(scene, seen))
+            person.moved_to(place, account.time, walks)
         person.last, person.figure = seen, index >= 0
         if not sure or (scene.since is None and person.gallery.views):
             return

@@ -249,8 +249,14 @@ class Person:
         self.first_place = turned @ self.first_place + shift
         self.velocity = turned @ self.velocity
 
-    def moved_to(self, place: FloatArray, time: float) -> None:
-        """Take a sight of it at ``place``, ``(2,)`` metres."""
+    def moved_to(self, place: FloatArray, time: float, walks: bool = True) -> None:
+        """Take a sight of it.
+
+        Args:
+            place: ``(2,)`` metres.
+            time: seconds.
+            walks: whether the step there may be its own.
+        """
         gone = time - self.seen_at
         if 0 < gone < RECENT:
             new = 1 - np.exp(-gone / VELOCITY_TIME)
@@ -261,7 +267,8 @@ class Person:
         self.seen_at, self.hidden = time, True
         self.misses = 0
         self.sightings += 1
-        self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
+        if walks:
+            self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
 
 
 def _off(places: FloatArray, place: FloatArray) -> FloatArray:
