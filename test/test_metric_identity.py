@@ -186,8 +186,9 @@ def test_height_speaks_for_the_same_and_against_another():
     people = np.random.default_rng(0).normal(1.7, 0.1, (2, 20_000))
     odds = [height_log_odds(float(a), float(b)) for a, b in people.T]
     assert float(np.mean(np.exp(odds))) == pytest.approx(1.0, abs=0.1)
-    # Somebody may sit down, so that no height alone can refuse him.
-    assert height_log_odds(1.1, 1.85) > -4
+    # Somebody may sit down, and that says little; a chair that is no higher than a desk is not he.
+    assert height_log_odds(1.3, 1.8) > -0.5
+    assert -4 < height_log_odds(0.95, 1.8) < -2.5
 
 
 def test_what_one_view_does_not_show_is_as_in_the_others():

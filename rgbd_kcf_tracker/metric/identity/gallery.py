@@ -68,6 +68,9 @@ standard deviation of 10 cm, as of adults, the mean over them, ``1 / (2 * sqrt(p
 STOOPED = 0.7
 """Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
 1 Hz heights of real people hardly tell who it is at all (docs/metric.md)."""
+SEATED, LOWER = 0.62, 0.05
+"""Share of somebody's height from which that is so: on a chair one is three quarters as high as
+when standing, bent over somewhat less; and the share of sightings with the head lower than that."""
 
 _FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(TINTS) - TINTS // 2] * 2, indexing='ij'))
 _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
@@ -259,7 +262,8 @@ def height_log_odds(top: float | None, known: float | None) -> float:
     """Log-odds that a head's height above the floor is the person's rather than anybody's."""
     if top is None or known is None:
         return 0.0
-    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) / ANY_HEIGHT + STOOPED
+    stooped = STOOPED if top > SEATED * known else LOWER
+    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) / ANY_HEIGHT + stooped
     return math.log(same)
 
 
