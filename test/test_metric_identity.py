@@ -453,7 +453,7 @@ def test_what_a_camera_that_moves_sees_more_and_more_of_does_not_walk(
 
 
 @pytest.mark.parametrize(
-    ('moves', 'known', 'may_be'), [(True, 1.7, False), (True, 1.2, True), (False, 1.7, True)]
+    ('moves', 'known', 'may_be'), [(True, 1.4, False), (True, 1.2, True), (False, 1.4, True)]
 )
 def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(
     moves: bool, known: float, may_be: bool
