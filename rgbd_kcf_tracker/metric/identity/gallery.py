@@ -68,9 +68,10 @@ standard deviation of 10 cm, as of adults, the mean over them, ``1 / (2 * sqrt(p
 STOOPED = 0.7
 """Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
 1 Hz heights of real people hardly tell who it is at all (docs/metric.md)."""
-SEATED, LOWER = 0.62, 0.05
+SEATED, LOWER = 0.55, 0.05
 """Share of somebody's height from which that is so: on a chair one is three quarters as high as
-when standing, bent over somewhat less; and the share of sightings with the head lower than that."""
+when standing, on one's knees or bent over somewhat less (at 0.62 who was half hidden was refused);
+and the share of sightings with the head lower than that."""
 
 _FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(TINTS) - TINTS // 2] * 2, indexing='ij'))
 _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
