@@ -141,11 +141,12 @@ class EgoMotion:
             self._anchor = _Anchor(last, last_view, others)
             self._unasked = seconds
         self._anchor.age += seconds
-        if self._since_crept > STANDS:
-            asks = self._unasked >= CREPT
-            self._asks = asks and seconds < FAST
-            if not asks or self._asks:
-                return None
+        stood = self._since_crept > STANDS
+        if stood and self._unasked < CREPT:
+            return None
+        if stood and seconds < FAST:
+            self._asks = True
+            return None
         self._unasked = 0.0
         crept = _crept(self._anchor, gray)
         if crept is not None:

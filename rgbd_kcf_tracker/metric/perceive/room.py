@@ -209,12 +209,17 @@ class Room:
             depth: ``(h, w)`` metres of a view.
             surfaces: of it.
         """
-        nearer = people & (self.depth > 0) & (self.depth - depth > tolerance(depth))
+        nearer = people & self._nearer(depth)
         theirs, before = (
             np.bincount(surfaces.labels[each], minlength=len(surfaces)) for each in (people, nearer)
         )
         result: Mask = people & (before < MOST * theirs)[surfaces.labels]
         return result
+
+    def _nearer(self, depth: DepthArray) -> Mask:
+        """Pixels, ``(h, w)`` bool, that show something before the room as far as it is known."""
+        nearer: Mask = (depth > 0) & (self.depth > 0) & (self.depth - depth > tolerance(depth))
+        return nearer
 
     def agrees(self, depth: DepthArray) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
@@ -265,7 +270,7 @@ class Room:
             large: ``(n,)`` bool, those of them that nobody can be.
         """
         known = (depth > 0) & (self.depth > 0) & ~somebody
-        nearer = known & (self.depth - depth > tolerance(depth))
+        nearer = known & self._nearer(depth)
         room = large & _continues_room(somebody, known, nearer, surfaces)
         part = somebody & room[surfaces.labels]
         if np.count_nonzero(part) <= MOST * np.count_nonzero(somebody):
@@ -293,10 +298,9 @@ class Room:
             dt: seconds since the last.
         """
         valid, known, count = depth > 0, self.depth > 0, len(surfaces)
-        allowed = tolerance(depth)
         # Where somebody stood, what is far behind him is not he.
-        gone = (self._front > 0) & (depth > self._front + _leap(dt, allowed))
-        nearer = known & (self.depth - depth > allowed)
+        gone = (self._front > 0) & (depth > self._front + _leap(dt, tolerance(depth)))
+        nearer = self._nearer(depth)
         nearer |= ~known & (self._blind >= BLIND_FRAMES) & ~gone
         nearer &= valid
         theirs = surfaces.labels[nearer]

@@ -207,7 +207,8 @@ def upright_people(
             if whole and seen.at_side(view, rim):
                 continue
             people[seen.rows, seen.cols] |= seen.mask
-            top = seen.highest(elevation)
-            if one[label] and seen.height >= LENGTH[0] and (top is None or top > GROWN):
-                tall_ones[seen.rows, seen.cols] |= seen.mask
+            if one[label] and seen.height >= LENGTH[0]:
+                top = seen.highest(elevation)
+                if top is None or top > GROWN:
+                    tall_ones[seen.rows, seen.cols] |= seen.mask
     return UprightPeople(people, tall_ones)
