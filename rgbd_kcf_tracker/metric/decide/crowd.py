@@ -602,11 +602,11 @@ class Crowd:
         if known:
             everyone = self._joined(known)
             compared = [Compared.of(sight.view, everyone) for sight in sights]
-            alike = np.stack([each.similarity() for each in compared], axis=1)
+            alike = np.array([each.similarity() for each in compared]).T
             starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
-            best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
+            best = np.array([each.of_each(starts) for each in compared]).T.tolist()
         rows = iter(best)
-        places = np.stack([s.figure.place for s in sights])
+        places = np.array([s.figure.place for s in sights])
         low = np.array([not _came(scene, s.figure.seen) for s in sights])
         for row, person in enumerate(self.people):
             likeness = next(rows) if person.gallery.looks is not None else None

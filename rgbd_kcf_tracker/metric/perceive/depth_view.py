@@ -60,12 +60,10 @@ class DepthView:
         step = max(1, min(round(frame.width / width), frame.height // 2))
         half = step // 2
         depth = np.array(frame.depth[half::step, half::step])
-        invalid = ~(depth > 0)
         if half:
             other = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]]
-            np.copyto(depth, other, where=invalid)
-            invalid = ~(depth > 0)
-        depth[invalid | ~np.isfinite(depth)] = 0.0
+            np.copyto(depth, other, where=~(depth > 0))
+        depth[~((depth > 0) & (depth < np.inf))] = 0.0
         k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
         return cls(
             depth,

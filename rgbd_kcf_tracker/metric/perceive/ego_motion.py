@@ -174,14 +174,17 @@ def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | Non
         among: ``(h, w)`` bool, the pixels that are asked; all without.
     """
     change = cv2.absdiff(gray[::2, ::2], last[::2, ::2])
+    asked = change.size if among is None else np.count_nonzero(among[::2, ::2])
+    least = max(CHANGED_SHARE * asked, 1)
+    # Where so few change at all, fewer do beyond what most of the picture does.
+    if np.count_nonzero(change > CHANGED) < min(least, change.size / 2):
+        return False
     # A change of light changes all alike and is no motion.
     change = cv2.absdiff(change, np.full_like(change, upper_median(change)))
     moved = change > CHANGED
-    asked = moved.size
     if among is not None:
         moved &= among[::2, ::2]
-        asked = np.count_nonzero(among[::2, ::2])
-    return bool(np.count_nonzero(moved) >= max(CHANGED_SHARE * asked, 1))
+    return bool(np.count_nonzero(moved) >= least)
 
 
 def corners_between(

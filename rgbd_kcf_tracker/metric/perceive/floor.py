@@ -129,10 +129,12 @@ class Floor:
 
         They are at right angles to each other however the camera rolls.
         """
-        down = self.height * self.plane(k)
-        level = np.array([0.0, 0.0, 1.0]) - down[2] * down
-        ahead = level / np.linalg.norm(level)
-        return np.stack((np.cross(down, ahead), ahead))
+        x, y, z = (self.height * self.plane(k)).tolist()
+        # Ahead is the optical axis without what of it points down, and right is at right angles.
+        ahead = (-z * x, -z * y, 1 - z * z)
+        length = math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
+        i, j, m = (each / length for each in ahead)
+        return np.array([[y * m - z * j, z * i - x * m, x * j - y * i], [i, j, m]])
 
     def row_at(self, u: float, z: float) -> float:
         """Row in which the floor is seen in column ``u`` at depth ``z``."""

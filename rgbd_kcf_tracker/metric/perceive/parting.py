@@ -60,6 +60,8 @@ def parted(
     depth = view.depth[top : top + rows, left : left + cols]
     ahead = forward[top : top + rows, left : left + cols]
     z = float(depth[mask].mean())
+    if len(expected) < 2 and cols * z / k.fx < BROAD:
+        return [(left, top, mask)]
     columns = np.arange(left, left + cols) + 0.5 - k.cx
     lines = np.arange(top, top + rows) + 0.5 - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.

@@ -348,8 +348,8 @@ class Room:
         nearer = self.depth - depth
         both = valid & known
         before = both & (nearer > allowed)
-        farther = both & (nearer < -allowed)
-        same = both & ~(before | farther)
+        same = both & (np.abs(nearer) <= allowed)
+        farther = both & ~(before | same) if learns else None
         new = valid & ~known
         open_ = np.flatnonzero(new & (self._blind >= BLIND_FRAMES))
         if len(open_):
@@ -370,9 +370,10 @@ class Room:
             cv2.add(self._blind, missing, self._blind)  # stays at the highest
             # What was known of a pixel that has no reading any more was somebody, who has gone.
             gone = self._blind >= GONE_FRAMES
-            self.depth[gone] = self._front[gone] = 0
+            np.copyto(self.depth, 0, where=gone)
+            np.copyto(self._front, 0, where=gone)
         self._unlearned += dt
-        if not learns:
+        if farther is None:
             return
         nearer *= same
         nearer *= np.float32(BLEND)

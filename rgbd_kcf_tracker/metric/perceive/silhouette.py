@@ -262,13 +262,14 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     y0, x0 = max(0, top - RING), max(0, left - RING)
     y1, x1 = min(height, top + rows + RING), min(width, left + cols + RING)
     around = view.depth[y0:y1, x0:x1]
-    nearer = (around > 0) & (around < z - (NEARER + NEARER_PER_METRE * z))
+    nearer = around < z - (NEARER + NEARER_PER_METRE * z)
+    nearer &= around > 0
+    if not nearer.any():
+        return Sides(False, False, False, False)
     body = np.zeros(nearer.shape, np.bool_)
     body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
     outside = ~body
     nearer &= outside
-    if not nearer.any():
-        return Sides(False, False, False, False)
     # Between two surfaces there often is a seam without a reading.
     nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
     nearer &= outside
