@@ -354,6 +354,12 @@ def test_a_face_does_not_become_the_body_below_it():
     assert run.success == 1.0
 
 
+def test_a_face_chosen_on_a_body_with_which_it_is_one_surface_is_followed_by_its_look():
+    """It was as a piece of that, which the next frame could not offer: the body was it at once."""
+    run = follow(simulate('face', seed=111, rate_hz=10.0, duration_s=2.0))
+    assert run.success == 1.0
+
+
 def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
     """The box stayed on the first of them, and nobody was found when he had left."""
     run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))

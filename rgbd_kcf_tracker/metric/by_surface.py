@@ -167,13 +167,16 @@ class BySurface:
         self._learn_around(scene, first, None)
 
     @staticmethod
-    def surface_of(account: Account, box: Box) -> Silhouette | None:
+    def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silhouette | None:
         """The figure or surface that a box of the image is drawn about, None where none fits."""
         scene = account.scene
         whole = BySurface.whole_of(account, box)
         if whole is not None:
             return BySurface._within(scene, whole, box)
-        return BySurface._piece_of(scene, box) or BySurface._scattered(scene, box)
+        piece = BySurface._piece_of(scene, box)
+        if piece is not None and not BySurface._found_again(account, piece, parameters):
+            piece = None
+        return piece or BySurface._scattered(scene, box)
 
     @staticmethod
     def whole_of(account: Account, box: Box) -> Silhouette | None:
@@ -209,6 +212,25 @@ class BySurface:
             return None
         part = BySurface._within(scene, scene.silhouette(label), box)
         return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None
+
+    @staticmethod
+    def _found_again(account: Account, piece: Silhouette, parameters: MetricParameters) -> bool:
+        """Whether the very frame in which a piece was chosen offers it, as the next would have to.
+
+        Who touches somebody is told from him, a head not from what it is a part of.
+        """
+        scene = account.scene
+        nobody = Person(0, account.place(piece), account.time)
+        followed = BySurface(account, piece, nobody, parameters)
+        found = propose(
+            scene,
+            followed.body,
+            followed._expected(0.0),
+            account.others(nobody),
+            parameters.most_candidates,
+        )
+        outline = BySurface.outline(scene, piece)
+        return any(BySurface.outline(scene, seen).iou(outline) >= LOCK_IOU for seen in found)
 
     @staticmethod
     def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:

@@ -220,7 +220,7 @@ class Follower:
     # -- by surface -------------------------------------------------------------------------------
 
     def _lock(self, frame: Frame, account: Account, box: Box) -> None:
-        seen = BySurface.surface_of(account, box)
+        seen = BySurface.surface_of(account, box, self._parameters)
         if seen is None:
             return
         self.seen = seen
