@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
@@ -82,6 +82,12 @@ and a target that fills the image costs no more."""
 SAME_DEPTH = 0.15
 """Share by which depth may change while the look is unsure. Who comes nearer at 1.5 m/s does so by
 that much in a tenth of a second at one metre; more of it is mostly somebody who passes before."""
+COMES = 2.0
+"""Metres a second by which it may have come nearer or gone away besides while it was not seen: at a
+brisk walk."""
+BORNE_OUT = 0.75
+"""Share of ``hidden_ratio`` below which what is as near as the target was is not it, either: what
+is turned in a hand looks like itself again in less than a second."""
 MOST = 0.6
 """Share of the pixels in the middle of a box that have a reading, from which these are taken to be
 the target's: where most have none, the target may be what reflects nothing, and they another's."""
@@ -147,6 +153,7 @@ class ByLook:
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
+        self._unseen = 0.0
         self._turn = True
         self._unlearned = 0.0
         self._put_off: Callable[[], None] | None = None
@@ -167,6 +174,7 @@ class ByLook:
         parameters = self._parameters
         self._follow_size(frame)
         self._turn = turn
+        self._unseen += dt
         if self._hidden and not turn:
             return None
         small = self._small = _small(frame)
@@ -183,7 +191,10 @@ class ByLook:
                 other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
                     sighting = other
-            self._hidden = sighting.ratio < parameters.hidden_ratio
+            self._hidden = sighting.ratio < parameters.hidden_ratio and not (
+                sighting.ratio > BORNE_OUT * parameters.hidden_ratio
+                and self._as_near(frame, sighting)
+            )
         self.response = sighting.ratio
         if self._hidden:
             look = self._moving(frame)
@@ -196,7 +207,7 @@ class ByLook:
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
-        self.last_box = look.box
+        self.last_box, self._unseen = look.box, 0.0
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
@@ -325,11 +336,34 @@ class ByLook:
 
     def _look_at(self, frame: Frame, small: Image, cx: float, cy: float) -> Sighting:
         """Look about a place; what stood there while the target was elsewhere is not seen."""
-        sighting = self._appearance.look(frame.color, cx, cy, self._scale)
+        possible = self._possible(frame, cx, cy)
+        sighting = self._appearance.look(frame.color, cx, cy, self._scale, possible)
         box = Box.from_center(sighting.cx, sighting.cy, *self._size)
         if self._elsewhere.unchanged(small, box.over(_step_of(frame))):
             return dataclasses.replace(sighting, peak=0.0, ratio=0.0)
         return sighting
+
+    def _possible(self, frame: Frame, cx: float, cy: float) -> Mask | None:
+        """The cells of a window about ``cx, cy`` about which something is as near as the target.
+
+        Those without a reading are, too. None where its own depth is not known.
+        """
+        if frame.depth is None or self._depth is None:
+            return None
+        columns, rows = self._appearance.cells(cx, cy, self._scale)
+        u = np.clip(columns, 0, frame.width - 1).astype(np.intp)
+        v = np.clip(rows, 0, frame.height - 1).astype(np.intp)
+        off = np.abs(frame.depth[np.ix_(v, u)] - np.float32(self._depth))
+        near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
+        about: Mask = cv2.dilate(near.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
+        return about
+
+    def _as_near(self, frame: Frame, sighting: Sighting) -> bool:
+        """Whether what was sighted is as near as the target was."""
+        depth = depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *self._size))
+        if depth is None or self._depth is None:
+            return False
+        return abs(depth / self._depth - 1) < SAME_DEPTH
 
     def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.

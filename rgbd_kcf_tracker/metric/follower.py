@@ -14,7 +14,7 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look
-from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface, Candidate
+from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, SAME_OUTLINE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
@@ -59,10 +59,8 @@ PART_SEEN = 0.8
 five are right on simulated scenes, and most of the others are on the little that shows of him."""
 SUREST_LOOK = 0.9
 """Score of a box found by look at full response: on colour alone about nine of ten are right."""
-RELOCK_IOU = 0.7
 RELOCK_FRAMES = 3
-"""Overlap of what the look finds with a surface, and in how many frames on end, to go over to the
-surface. At 0.35 a mug in a hand became the person (docs/metric.md)."""
+"""Frames on end in which what the look finds must be a surface to go over to it."""
 RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 """Sightings of a returning target, and seconds of them, after which it is the target for good, and
 the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz half a second, as
@@ -512,7 +510,10 @@ class Follower:
             self._agreed = 0
             return False
         whole = BySurface.whole_of(account, look.box)
-        if whole is not None and BySurface.outline(account.scene, whole).iou(look.box) > RELOCK_IOU:
+        if (
+            whole is not None
+            and BySurface.outline(account.scene, whole).iou(look.box) > SAME_OUTLINE
+        ):
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:
                 self._lock(frame, account, look.box)

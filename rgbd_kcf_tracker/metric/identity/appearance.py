@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
@@ -141,7 +141,15 @@ class Appearance:
         """How likely each pixel of an image is the target's by its colour, ``(h, w)`` 0 to 1."""
         return self._colors.of(rgb_codes(color))
 
-    def look(self, color: Image, cx: float, cy: float, scale: float) -> Sighting:
+    def cells(self, cx: float, cy: float, scale: float) -> tuple[FloatArray, FloatArray]:
+        """Columns and rows, ``(cells,)`` pixels each, of the cells of a window about ``cx, cy``."""
+        n = self._cells
+        place = (np.arange(n, dtype=np.float64) + 0.5 - n / 2) * (self._base * scale / n)
+        return cx + place, cy + place
+
+    def look(
+        self, color: Image, cx: float, cy: float, scale: float, possible: Mask | None = None
+    ) -> Sighting:
         """Look for the target in the window about ``cx, cy``.
 
         Args:
@@ -149,10 +157,11 @@ class Appearance:
             cx: column of the window's middle in pixels.
             cy: row of the window's middle.
             scale: the target's size against its first one.
+            possible: ``(cells, cells)``, where its middle may be; None for anywhere.
         """
-        return self._sighted(self._read(color, cx, cy, scale))
+        return self._sighted(self._read(color, cx, cy, scale), possible)
 
-    def _sighted(self, read: _Reading) -> Sighting:
+    def _sighted(self, read: _Reading, possible: Mask | None = None) -> Sighting:
         response = self._filter.response(read.spectrum)
         total = response
         if self._share > 0:
@@ -161,6 +170,9 @@ class Appearance:
             mean = cv2.boxFilter(posterior, -1, size, borderType=cv2.BORDER_REPLICATE)
             mean = cv2.resize(mean, (self._cells, self._cells), interpolation=cv2.INTER_AREA)
             total = (1 - self._share) * response + self._share * fft.ifftshift(mean)
+        if possible is not None:
+            possible = fft.ifftshift(possible)
+            response, total = response * possible, total * possible
         n = self._cells
         i, j = (int(k) for k in np.unravel_index(int(np.argmax(total)), total.shape))
         dy = _vertex(total[(i - 1) % n, j], total[i, j], total[(i + 1) % n, j])
