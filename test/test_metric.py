@@ -367,6 +367,16 @@ def test_a_thing_in_a_hand_does_not_become_what_it_is_carried_past():
     assert run.success > 0.9
 
 
+def test_who_has_no_reading_and_turns_round_is_followed_and_not_who_passes_before_him():
+    """An unlike look was refused, though depth tells nothing of him; then the passer was he."""
+    run = follow(simulate('missing_depth', seed=120, rate_hz=10.0))
+    assert run.success > 0.85
+    shown = [
+        o for t, v, o in zip(run.tracks, run.visible, run.overlaps, strict=True) if t.box and v
+    ]
+    assert min(shown) > 0.1
+
+
 def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
     """The box stayed on the first of them, and nobody was found when he had left."""
     run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))

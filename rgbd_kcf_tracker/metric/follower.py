@@ -147,6 +147,7 @@ class Follower:
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
+        self._beside: set[int] = set()
         self._ends: Sides | None = None
         self._elsewhere = Elsewhere()
         self._stood: Stood | None = None
@@ -413,8 +414,10 @@ class Follower:
                 self._stood.carried(account.scene.motion, dt)
         look, stood = self._look.step(frame, dt, turn), 0.0
         if look is not None and account is not None:
-            # Where depth does not show it either, a look that has become unlike is something else.
-            unlike = look.ratio < self._parameters.seen_ratio
+            # Where depth does not show it either, a look that has become unlike is something else;
+            # but depth says nothing of what has no reading.
+            silent = look.depth is None and self._last_depth is None
+            unlike = look.ratio < self._parameters.seen_ratio and not silent
             unlike = unlike and not self._goes_on(account, look)
             reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
             if unlike or any(refused(account, look) for refused in reasons):
@@ -430,6 +433,8 @@ class Follower:
                 self._stood.seen(place, sigma, dt)
                 stood = self._stood.log_odds(place, sigma)
             self._last_depth = look.depth
+            if account is not None:
+                self._beside |= _people_beside(account, look.box)
             self._unseen, self._carried = 0.0, False
         else:
             self._unseen += dt
@@ -533,7 +538,10 @@ class Follower:
             return None
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
-            known = row >= 0 and account.people[row].first_seen <= self._since
+            person = account.people[row] if row >= 0 else None
+            known = person is not None and (
+                person.first_seen <= self._since or person.number in self._beside
+            )
             if known and account.looks[row, column] > 0:
                 continue
             if sight.figure.parted:  # where it ends is a guess
@@ -671,6 +679,15 @@ def _people_about(account: Account, box: Box) -> frozenset[int]:
     kinds = np.unique(account.parts.kinds[_part(account.scene, box)])
     owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
     return frozenset(account.people[owner].number for owner in owners if owner >= 0)
+
+
+def _people_beside(account: Account, box: Box) -> set[int]:
+    """Numbers of all who show beside a box: the target is in it, whoever passes it later."""
+    return {
+        account.people[owner].number
+        for owner, sight in zip(account.owner, account.sights, strict=True)
+        if owner >= 0 and BySurface.outline(account.scene, sight.figure.seen).intersection(box) == 0
+    }
 
 
 def _room_share(account: Account, box: Box) -> float:
