@@ -377,6 +377,12 @@ def test_who_has_no_reading_and_turns_round_is_followed_and_not_who_passes_befor
     assert min(shown) > 0.1
 
 
+def test_who_has_no_reading_for_a_while_is_not_who_walks_away_meanwhile():
+    """The account did not hear that his look was where he was, and gave his number to a passer."""
+    run = follow(simulate('missing_depth', seed=128, rate_hz=10.0))
+    assert run.success > 0.9
+
+
 def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
     """The box stayed on the first of them, and nobody was found when he had left."""
     run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))

@@ -466,6 +466,12 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         self._misses = 0
 
+    @property
+    def middle(self) -> FloatArray:
+        """Where the middle of the target is, ``(3,)`` metres in the camera's frame."""
+        x, top, z = self.motion.position.tolist()
+        return np.array([x, top + self.body.height / 2, z])
+
     def stood_at(self, view: DepthView, box: Box) -> float:
         """Log-odds, by where it stood, that the target is in a box of the image."""
         return self._stood.log_odds(*self._at(view, box))

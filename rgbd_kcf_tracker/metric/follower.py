@@ -390,6 +390,9 @@ class Follower:
                     and not self._stood_there(account, look.box)
                 ):
                     surface.seen_elsewhere(view, look.box)
+                    if account is not None and self.person is not None:
+                        place = account.scene.axes @ surface.middle
+                        self.person.placed(place, account.time)
                     score = _score(look, stood)
                     return self._tracked(frame, look.box, score, look.depth, surface.belief())
         surface.miss(scene, dt)

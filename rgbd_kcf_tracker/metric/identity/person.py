@@ -142,6 +142,10 @@ class Person:
         # What hides somebody mostly passes; who has left shows by his empty place.
         return STANDS * float(np.exp(-gone / FORGET)) if self.hidden else 0.0
 
+    def placed(self, place: FloatArray, time: float) -> None:
+        """Take where it is, ``(2,)`` metres, by other means: depth shows nothing of it."""
+        self.place, self.seen_at, self.misses = place, time, 0
+
     def missed(self, depth: DepthArray) -> None:
         """Take a frame in which it was not found.
 
