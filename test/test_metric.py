@@ -383,6 +383,12 @@ def test_who_has_no_reading_for_a_while_is_not_who_walks_away_meanwhile():
     assert run.success > 0.9
 
 
+def test_a_thing_before_a_camera_that_is_turned_fast_along_a_wall_is_found_again():
+    """Depth showed a wall as before: the thing seemed to be elsewhere, and was refused for good."""
+    run = follow(simulate('mug_hand_held', seed=113, rate_hz=5.0))
+    assert run.success > 0.9
+
+
 def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
     """The box stayed on the first of them, and nobody was found when he had left."""
     run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))

@@ -326,7 +326,7 @@ class BySurface:
         self._dt = dt
         if self._person.figure:
             self._stood.moves()
-        self._stood.carried(scene.motion, dt)
+        self._stood.carried(scene.way, dt)
         if isinstance(scene.motion, Pose):
             self.motion.carried(scene.motion)
             if self._cloud is not None:

@@ -414,7 +414,7 @@ class Follower:
         if account is not None:
             self._carried |= account.scene.motion is not None
             if self._stood is not None:
-                self._stood.carried(account.scene.motion, dt)
+                self._stood.carried(account.scene.way, dt)
         look, stood = self._look.step(frame, dt, turn), 0.0
         if look is not None and account is not None:
             # Where depth does not show it either, a look that has become unlike is something else;

@@ -55,6 +55,9 @@ fit of :data:`ITERATIONS` hardly finds that, as it begins with this scale."""
 STILL, LEAST_STILL = 0.3, 0.35
 """Pixels of flow up to which a corner stands still, and the share of them from which the camera
 does: somebody may have stepped before the others."""
+MANY, HARDLY = 36, 0.05
+"""Corners from which, and the share of them that stands still below which, the camera has moved for
+good, also where depth agrees, as before a wall."""
 CREPT, FORGOTTEN = 0.3, 0.6
 """Seconds after which it is asked whether a camera that seems to stand has crept, and seconds for
 which the picture is kept with which that is told: a robot that drives through a hall at the pace of
@@ -72,7 +75,13 @@ LEAST_CREEPING = LEAST_CORNERS // 2
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """The camera has moved, and nothing tells how."""
+    """The camera has moved, and nothing tells how.
+
+    Attributes:
+        surely: whether the picture says so for good: of many corners hardly any is where it was.
+    """
+
+    surely: bool = False
 
 
 @dataclass(slots=True)
@@ -238,8 +247,12 @@ def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> b
 
 
 def _still(first: Points, second: Points) -> bool:
-    still = np.count_nonzero(np.abs(second - first).max(axis=1) < STILL)
-    return bool(still >= max(LEAST_CORNERS, LEAST_STILL * len(first)))
+    return _stood(first, second) >= max(LEAST_CORNERS, LEAST_STILL * len(first))
+
+
+def _stood(first: Points, second: Points) -> int:
+    """How many corners are where they were."""
+    return int(np.count_nonzero(np.abs(second - first).max(axis=1) < STILL))
 
 
 def upper_median(values: GrayImage) -> int:
@@ -260,18 +273,19 @@ def _told(
     motion = _agreed(first, second, last_view, np.zeros(3))
     if motion is not None:
         return motion
+    lost = Lost(surely=len(first) >= MANY and _stood(first, second) < HARDLY * len(first))
     # What has left the view is found anywhere, and from there nothing leads back.
     back, found = followed(gray, last, second.astype(np.float32))
     leads = found & (np.abs(back - first).max(axis=1) < AGREE)
     first, second = first[leads], second[leads]
     if len(first) < LEAST_CORNERS:
-        return Lost()
+        return lost
     right, down = np.median(second - first, axis=0).tolist()
     if math.hypot(right, down) <= FAR:
-        return Lost()
+        return lost
     k = last_view.intrinsics
     motion = _agreed(first, second, last_view, np.array([-down / k.fy, right / k.fx, 0.0]))
-    return Lost() if motion is None else motion
+    return lost if motion is None else motion
 
 
 def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:

@@ -56,6 +56,8 @@ class Scene:
         codes: of its colours.
         motion: the pose of the last frame's camera in that of now; None where it stood still, Lost
             where it has moved and nothing tells how.
+        way: the same for a place that is kept in the world: Lost also where depth shows what it
+            showed before, as of a wall along which a camera turns, and only the picture does not.
         stood_for: seconds for which the camera has stood still, 0 while it moves.
         since: seconds since the last one from which looks and sizes were learned; None where
             nothing is to be learned from this one but where everybody is, see
@@ -75,6 +77,7 @@ class Scene:
     image: npt.NDArray[np.uint8]
     codes: ColorCodes
     motion: Pose | Lost | None
+    way: Pose | Lost | None
     stood_for: float
     since: float | None
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
@@ -149,7 +152,9 @@ class SceneReader:
         teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
         image = view_image(frame.color, view.step, view.shape)
         motion = self._move(image, view, frame.pose, seconds)
+        way = motion
         if isinstance(motion, Lost) and self.room.agrees(view.depth):
+            way = motion if motion.surely else None
             motion = None
         floor = (
             self._floors.update(view, seconds, learns, motion) if self._floor_margin > 0 else None
@@ -210,6 +215,7 @@ class SceneReader:
             image,
             ColorCodes(image),
             motion,
+            way,
             self.stood_for,
             since,
         )
