@@ -361,6 +361,12 @@ def test_a_face_chosen_on_a_body_with_which_it_is_one_surface_is_followed_by_its
     assert run.success == 1.0
 
 
+def test_a_face_is_found_again_at_its_size_when_another_has_passed_close_before_it():
+    """The box went over to the passer's for a frame, and his size was looked for from then on."""
+    run = follow(simulate('face', seed=116, rate_hz=5.0))
+    assert run.success > 0.9
+
+
 def test_a_thing_in_a_hand_does_not_become_what_it_is_carried_past():
     """Turned in the hand it looked less like itself than the chest behind it, and then a head."""
     run = follow(simulate('carried_mug', seed=114, rate_hz=10.0))

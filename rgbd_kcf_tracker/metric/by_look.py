@@ -154,6 +154,8 @@ class ByLook:
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unseen = 0.0
+        self._last_depth = self._depth
+        self._sure = self._scale, self._depth
         self._turn = True
         self._unlearned = 0.0
         self._put_off: Callable[[], None] | None = None
@@ -208,6 +210,9 @@ class ByLook:
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
         self.last_box, self._unseen = look.box, 0.0
+        last, self._last_depth = self._last_depth, look.depth
+        if look.depth and last and abs(look.depth / last - 1) < SAME_DEPTH:
+            self._sure = self._scale, self._depth
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
@@ -282,6 +287,8 @@ class ByLook:
 
     def _lose(self, frame: Frame) -> None:
         self._flow.forget()
+        if self._first_depth is not None:  # a leap of depth before was to what hides it
+            self._scale, self._depth = self._sure
         if self._backdrop is not None:
             self._backdrop.miss(self.last_box.over(_step_of(frame)))
 

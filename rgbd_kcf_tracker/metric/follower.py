@@ -13,7 +13,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look
+from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look, depth_in
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, SAME_OUTLINE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
@@ -165,6 +165,7 @@ class Follower:
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
+            self._last_depth = depth_in(frame, box)
         belief = self._belief()
         self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
@@ -465,9 +466,11 @@ class Follower:
         if self._unseen > 0 or look.depth is None or self._last_depth is None:
             return False
         near = abs(look.depth / self._last_depth - 1) < SAME_DEPTH
+        if not near or look.box.intersection(self._last_box) == 0:
+            return False
         before = account.scene.before[_part(account.scene, look.box)]
         stands = np.count_nonzero(before) >= (1 - IS_ROOM) * before.size > 0
-        return bool(near and stands and look.box.intersection(self._last_box) > 0)
+        return bool(stands or not account.settled)
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
