@@ -637,6 +637,34 @@ def test_windows_reach_outside_the_image_and_shrink_large_ones():
     assert rgb_codes(whole).max() < 4096
 
 
+def test_a_look_that_is_hidden_while_the_images_change_their_size_is_found_again():
+    """It was sought at the size in pixels that it had in the images before."""
+    rng = np.random.default_rng(0)
+    room = cv2.resize(rng.integers(90, 130, (24, 32, 3), np.uint8), (640, 480))
+    thing = np.kron(rng.integers(0, 255, (6, 6, 3), np.uint8), np.ones((10, 10, 1), np.uint8))
+    box = Box(290, 210, 60, 60)
+
+    def at(step: int, shows: bool, half: bool = False) -> Frame:
+        color, depth = room.copy(), np.full((480, 640), 3.0, np.float32)
+        if shows:
+            color[210:270, 290:350], depth[210:270, 290:350] = thing, 2.0
+        if half:
+            color = cv2.resize(color, (320, 240), interpolation=cv2.INTER_AREA)
+            depth = depth[::2, ::2]
+        return Frame(color, depth, step * 10**8)
+
+    tracker = ByLook(at(0, True), box, MetricParameters())
+    for step in range(1, 4):
+        look = tracker.step(at(step, True), 0.1)
+        assert look is not None
+        tracker.take(at(step, True), look, 0.1)
+        tracker.settle()
+    assert tracker.step(at(4, False, half=True), 0.1) is None
+    look = tracker.step(at(5, True, half=True), 0.1)
+    assert look is not None
+    assert look.box.iou(Box(145, 105, 30, 30)) > 0.9
+
+
 def test_a_glance_finds_the_target_and_learns_nothing():
     image, box = blobs(4, 300), Box(120, 110, 50, 70)
     first = Frame(image, None, 0)

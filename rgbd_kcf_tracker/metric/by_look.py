@@ -123,6 +123,7 @@ class ByLook:
     Attributes:
         response: the filter's in the last look against its own recent mean.
         last_box: where the target was found last, in pixels of the newest image.
+        last_depth: metres that were read on it there, None where there was no reading.
     """
 
     def __init__(self, frame: Frame, box: Box, parameters: MetricParameters) -> None:
@@ -154,7 +155,7 @@ class ByLook:
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
         self._unseen = 0.0
-        self._last_depth = self._depth
+        self.last_depth = self._depth
         self._sure = self._scale, self._depth
         self._turn = True
         self._unlearned = 0.0
@@ -195,7 +196,7 @@ class ByLook:
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio and not (
                 sighting.ratio > BORNE_OUT * parameters.hidden_ratio
-                and self._as_near(frame, sighting)
+                and as_near(self._depth_of(frame, sighting), self._depth)
             )
         self.response = sighting.ratio
         if self._hidden:
@@ -210,9 +211,9 @@ class ByLook:
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
         self.last_box, self._unseen = look.box, 0.0
-        last, self._last_depth = self._last_depth, look.depth
-        if look.depth and last and abs(look.depth / last - 1) < SAME_DEPTH:
+        if look.depth is None or as_near(look.depth, self.last_depth):
             self._sure = self._scale, self._depth
+        self.last_depth = look.depth
         self._put_off = partial(self._taken, frame, look, dt)
 
     def _taken(self, frame: Frame, look: Look, dt: float) -> None:
@@ -306,6 +307,8 @@ class ByLook:
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
         self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
+        scale, depth = self._sure
+        self._sure = float(np.clip(scale * zoom, *SCALE_RANGE)), depth
 
     def _depthless(self, frame: Frame) -> bool:
         """Whether depth tells nothing of the target's size."""
@@ -365,12 +368,8 @@ class ByLook:
         about: Mask = cv2.dilate(near.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
         return about
 
-    def _as_near(self, frame: Frame, sighting: Sighting) -> bool:
-        """Whether what was sighted is as near as the target was."""
-        depth = depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *self._size))
-        if depth is None or self._depth is None:
-            return False
-        return abs(depth / self._depth - 1) < SAME_DEPTH
+    def _depth_of(self, frame: Frame, sighting: Sighting) -> float | None:
+        return depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *self._size))
 
     def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.
@@ -458,7 +457,7 @@ class ByLook:
     def _rescale(self, frame: Frame, depth: float | None, sighting: Sighting, dt: float) -> None:
         """Follow the size: by depth where it is known, else by the look."""
         if self._first_depth and self._depth and depth and 0.5 < depth / self._depth < 2:
-            if abs(depth / self._depth - 1) < SAME_DEPTH or sighting.ratio > UNSURE:
+            if as_near(depth, self._depth) or sighting.ratio > UNSURE:
                 self._depth = depth
             wanted = np.log(self._first_depth / self._depth * self._zoom / self._scale)
             self._scale *= float(np.exp(np.clip(wanted, -0.3, 0.3) * min(1, dt / SCALE_TIME)))
@@ -485,6 +484,13 @@ def _small(frame: Frame) -> Image:
     step = _step_of(frame)
     rows, cols = (len(range(step // 2, side, step)) for side in (frame.height, frame.width))
     return view_image(frame.color, step, (rows, cols))
+
+
+def as_near(depth: float | None, other: float | None) -> bool:
+    """Whether two depths are both known and as good as the same."""
+    if depth is None or other is None:
+        return False
+    return abs(depth / other - 1) < SAME_DEPTH
 
 
 def depth_in(frame: Frame, box: Box) -> float | None:

@@ -177,9 +177,9 @@ class BySurface:
         if whole is not None:
             return BySurface._within(scene, whole, box)
         piece = BySurface._piece_of(scene, box)
-        if piece is not None and not BySurface._found_again(account, piece, parameters):
-            piece = None
-        return piece or BySurface._scattered(scene, box)
+        if piece is not None and BySurface._found_again(account, piece, parameters):
+            return piece
+        return BySurface._scattered(scene, box)
 
     @staticmethod
     def whole_of(account: Account, box: Box) -> Silhouette | None:

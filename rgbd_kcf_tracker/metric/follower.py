@@ -13,7 +13,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook, Look, depth_in
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, SAME_OUTLINE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import SMALL, WHOLE, Account, Crowd
@@ -143,7 +143,6 @@ class Follower:
         self._hidden_for = 0.0
         self._agreed = 0
         self._unseen = 0.0
-        self._last_depth: float | None = None
         self._mobile = self._carried = self._partial = False
         self._since = crowd.time
         self._about: frozenset[int] = frozenset()
@@ -165,7 +164,6 @@ class Follower:
         self._look: ByLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
-            self._last_depth = depth_in(frame, box)
         belief = self._belief()
         self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
@@ -420,7 +418,7 @@ class Follower:
         if look is not None and account is not None:
             # Where depth does not show it either, a look that has become unlike is something else;
             # but depth says nothing of what has no reading.
-            silent = look.depth is None and self._last_depth is None
+            silent = look.depth is None and self._look.last_depth is None
             unlike = look.ratio < self._parameters.seen_ratio and not silent
             unlike = unlike and not self._goes_on(account, look)
             reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
@@ -436,7 +434,6 @@ class Follower:
                     self._stood = Stood(place, sigma, width)
                 self._stood.seen(place, sigma, dt)
                 stood = self._stood.log_odds(place, sigma)
-            self._last_depth = look.depth
             if account is not None:
                 self._beside |= _people_beside(account, look.box)
             self._unseen, self._carried = 0.0, False
@@ -463,9 +460,8 @@ class Follower:
 
     def _goes_on(self, account: Account, look: Look) -> bool:
         """Whether depth shows something as near as the target was a frame ago, before the room."""
-        if self._unseen > 0 or look.depth is None or self._last_depth is None:
-            return False
-        near = abs(look.depth / self._last_depth - 1) < SAME_DEPTH
+        assert self._look is not None
+        near = self._unseen == 0 and as_near(look.depth, self._look.last_depth)
         if not near or look.box.intersection(self._last_box) == 0:
             return False
         before = account.scene.before[_part(account.scene, look.box)]

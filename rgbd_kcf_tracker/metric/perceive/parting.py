@@ -60,7 +60,8 @@ def parted(
     depth = view.depth[top : top + rows, left : left + cols]
     ahead = forward[top : top + rows, left : left + cols]
     z = float(depth[mask].mean())
-    if len(expected) < 2 and cols * z / k.fx < BROAD:
+    narrow = cols * z / k.fx < BROAD
+    if narrow and len(expected) < 2:
         return [(left, top, mask)]
     columns = np.arange(left, left + cols) + 0.5 - k.cx
     lines = np.arange(top, top + rows) + 0.5 - k.cy
@@ -77,7 +78,7 @@ def parted(
             inside &= (seeds[:, 1] > near - 0.3) & (seeds[:, 1] < far + 0.3)
         seeds = seeds[inside]
     if len(seeds) < 2:
-        if cols * z / k.fx < BROAD:
+        if narrow:
             return [(left, top, mask)]
         seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
         if len(seeds) < 2:
