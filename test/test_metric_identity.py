@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
 from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
+from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight
 from rgbd_kcf_tracker.metric.decide.arrivals import (
     GONE,
     RETURN,
@@ -43,16 +44,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
     bounded,
     is_new,
 )
-from rgbd_kcf_tracker.metric.decide.crowd import (
-    MOST_PEOPLE,
-    NEW,
-    NEW_AREA,
-    REUNION,
-    SMALL,
-    Account,
-    Crowd,
-    Sight,
-)
+from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.crowd import MISSES, SMALL, Account, absent
+from rgbd_kcf_tracker.metric.decide.account import MISSES, SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import (
     FADE,

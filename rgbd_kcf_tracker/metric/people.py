@@ -15,7 +15,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.crowd import Sight
+from rgbd_kcf_tracker.metric.decide.account import Sight
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView

@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_surface import Candidate
-from rgbd_kcf_tracker.metric.decide.crowd import Account, Crowd
+from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import LEARNED, Follower

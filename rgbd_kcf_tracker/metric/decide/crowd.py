@@ -1,35 +1,33 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Everyone in view, explained together: each figure is somebody known, or somebody new."""
+"""Everyone who is remembered: each figure of the next frame is one of them, or somebody new."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Collection
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.arrays import FloatArray
-from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrival, Arrivals, away, is_new
-from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, Likeness, MixUps
-from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
-from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.gallery import (
-    ALL_SIDES,
-    Compared,
-    Looks,
-    View,
-    similarity,
+from rgbd_kcf_tracker.metric.decide.account import (
+    MISSES,
+    RECENT,
+    REUNION,
+    SAME_AGAIN,
+    Account,
+    Sight,
 )
+from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, away, is_new
+from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.identity.comeback import Comeback
+from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Compared, Looks, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures, place_of
+from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -59,12 +57,6 @@ HEAD_LEVEL = 1.1
 room that is known and at a distance from everybody else, is somebody new however little of him
 shows beside a monitor or the image's end. From 1.0 m on real people are the same, from 1.3 m on
 those who sit are left out."""
-SMALL = 0.1
-"""Square metres of a thing up to which it may be part of somebody's figure: what fits in the hands
-or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
-STEP, STEP_PER_SECOND = 0.3, 1.0
-"""Metres in depth by which somebody's pixels differ, about an arm's reach, and metres a second
-that they may have moved on since the last sight: a walk."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
 with what is behind, and feet lie as near to the floor as its depth is uncertain."""
@@ -74,9 +66,6 @@ shoulder's breadth, as no piece of somebody lies farther from his middle."""
 STRIP = 0.15
 """Metres of a figure beside the part of it that was chosen from which that is somebody else, where
 it is taller than any limb: boxes are not drawn as narrow."""
-NEW_SCORE = 0.5
-"""Score of somebody who has just come into view: nothing is known of him to hold him against, and
-even odds claim nothing."""
 MOST_PEOPLE = 48
 """People who are remembered beside the chosen ones; who was seen longest ago is forgotten. It
 bounds time and memory, and is more than come by in most rooms."""
@@ -89,310 +78,9 @@ is away: a drawn box may hold two things, and what shows of one of them alone is
 the other is."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
-SAME = 0.8
-"""Share of a figure's area from which a silhouette that is part of it looks as it does: hardly a
-slice of it is missing then, and its look is not computed again."""
-MOST = 0.5
-"""Share of a silhouette's pixels from which it is taken to be the same as a figure, and of the
-figure's area: more than half, so that it is never the same as two."""
-SAME_AGAIN = 0.5
-"""Log-odds beyond those against coming back, and ahead of anybody else, at which somebody is one
-who was here before, by one sight or by several: a number given to a stranger is worse than one more
-number. With those against it they are seven to one, as for :data:`~.mix_ups.MIXED_UP`."""
-REUNION, PAUSE = 1.0, 3.0
-"""Seconds of absence after which somebody who was chosen is recognised by more than his place; and
-the same where hardly a frame was taken meanwhile, as by a slow camera. Within a second a walker
-goes on as before; and a camera that gives 0.9 images a second instead of one is not to find
-everybody away, as it did at 0.97."""
-MISSES = 2
-"""Frames in which somebody was not found that are no chance: one may be blurred, or lost on the
-way."""
 AT_REST = 1.0
 """Seconds for which a camera must have stood for what comes before the room to have come: one that
 turns to and fro stands for a moment each time."""
-RECENT = 0.6
-"""Seconds after the last sight for which a figure is parted where somebody is expected: some frames
-at 5 Hz. By then a walker may be a metre from there, and who is not there is not to cut another."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sight:
-    """A figure with its look."""
-
-    figure: Figure
-    view: View
-
-
-@dataclass(frozen=True, slots=True)
-class Claim:
-    """What the others in view say of a candidate.
-
-    Attributes:
-        look: log-odds that its look is the target's.
-        mine: log-odds, place and look together, that the figure which it is part of is the
-            target; 0 where it is part of none.
-        rival: log-odds that it is somebody else who was seen beside the target, at least 0:
-            somebody new is always possible.
-        assigned: 1 where its figure is explained as the target, -1 as somebody else, 0 as neither;
-            1 for a target that was no figure when it was last seen: nothing then objects.
-        room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
-    """
-
-    look: float
-    mine: float
-    rival: float
-    assigned: int
-    room: float
-
-
-@dataclass(eq=False)
-class Account:
-    """How a frame is explained.
-
-    Attributes:
-        scene: what it shows.
-        time: seconds.
-        sights: what stands before the room, ``n`` of them.
-        people: all who are known, ``m`` of them.
-        odds: ``(m, n)`` log-odds of each being each.
-        looks: ``(m, n)`` the part of the look and the height in them.
-        settled: whether the room has been seen for long enough to tell what stands before it.
-        against: log-odds against any one of those who are away coming back just now.
-        sure: how likely those who came back are whom they were taken for, 0 to 1, by their numbers.
-        owner: for each sight the index among ``people``, or -1.
-        verdict: the same as the frame explains itself best, who was chosen and is away included.
-    """
-
-    scene: Scene
-    time: float
-    sights: list[Sight]
-    people: list[Person]
-    odds: FloatArray
-    looks: FloatArray
-    settled: bool
-    against: float
-    sure: Mapping[int, float]
-    owner: list[int] = field(default_factory=list)
-    verdict: list[int] = field(default_factory=list)
-    _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
-
-    @cached_property
-    def parts(self) -> Parts:
-        """Which of the sights, or the room, each pixel shows."""
-        return Parts(self.scene, [sight.figure.seen for sight in self.sights])
-
-    @property
-    def owners(self) -> list[Person]:
-        """Whoever a sight of the frame is of."""
-        return [self.people[row] for row in self.owner if row >= 0]
-
-    @property
-    def unmoved(self) -> list[tuple[Person, Silhouette]]:
-        """Those in view whom nobody chose and who have never walked, and where they are."""
-        pairs = zip(self.owner, self.sights, strict=True)
-        seen = [(self.people[row], sight.figure.seen) for row, sight in pairs if row >= 0]
-        return [each for each in seen if not each[0].chosen and each[0].travelled < TRAVELLED]
-
-    def was_away(self, person: Person) -> bool:
-        """Whether somebody has been absent for so long that his place says little."""
-        return absent(self.time - person.seen_at, person.misses)
-
-    def place(self, seen: Silhouette) -> FloatArray:
-        """Where a silhouette is, ``(2,)`` metres across and along the floor."""
-        place = self._places.get(seen)
-        if place is None:
-            place = self._places[seen] = place_of(self.scene, seen)
-        return place
-
-    def probability(self, row: int, column: int) -> float:
-        """That a sight is of one of the people rather than of any other, 0 to 1."""
-        if row >= len(self.odds):
-            return NEW_SCORE
-        odds = self.odds[:, column]
-        others = np.delete(odds, row)
-        total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
-        here = float(1 / (1 + total * np.exp(-min(odds[row], 30))))
-        return here * self.sure.get(self.people[row].number, 1.0)
-
-    def sight_of(self, seen: Silhouette) -> int:
-        """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
-        return self.sight_among(self.parts.counts(seen))
-
-    def sight_among(self, counts: list[int]) -> int:
-        """Index of the sight that most of some pixels belong to, -1 for none.
-
-        Args:
-            counts: of the pixels, see :meth:`Parts.counted`.
-        """
-        most = max(counts[FIRST:], default=0)
-        return counts.index(most, FIRST) - FIRST if most > MOST * sum(counts) else -1
-
-    def figure_of(self, seen: Silhouette) -> int:
-        """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
-        index = self.sight_of(seen)
-        if index >= 0 and seen.area < MOST * self.sights[index].figure.seen.area:
-            return -1
-        return index
-
-    def look(self, seen: Silhouette) -> View:
-        """The look of any silhouette of the frame."""
-        for sight in self.sights:
-            if sight.figure.seen.same(seen):
-                return sight.view
-        top = None if seen.cut.top else seen.highest(self.scene.elevation)
-        return View.of(self.scene.view, self.scene.codes, seen, top)
-
-    def claim(self, person: Person, seen: Silhouette) -> Claim:
-        """What all that is known of the frame says of a silhouette being ``person``."""
-        # A small thing is no figure, but may be in the hands or at the feet of one.
-        small = person.area < SMALL
-        index = -1 if small else self.sight_of(seen)
-        look = None
-        stranger = self.stranger(person, index)
-        if stranger is not None:
-            look = stranger.resemblance(person.number)
-        if look is None and index >= 0 and person in self.people[: len(self.looks)]:
-            whole = self.sights[index].figure.seen
-            if SAME < whole.area / seen.area < 1 / SAME:
-                look = float(self.looks[self.people.index(person), index])
-        if look is None:
-            look = person.gallery.log_odds(self.look(seen))
-        rival = mine = 0.0
-        assigned = 0 if person.figure and not small else 1
-        if index >= 0:
-            assigned = 0
-            if stranger is not None and self.likest(stranger) is person:
-                assigned = 1
-            elif self.verdict[index] >= 0:
-                assigned = 1 if self.people[self.verdict[index]] is person else -1
-            for row, other in enumerate(self.people[: len(self.odds)]):
-                if other is person:
-                    mine = float(self.odds[row, index])
-                elif other.number in person.met:
-                    rival = max(rival, float(self.odds[row, index]))
-        return Claim(look, mine, rival, assigned, self._room_beside(person, seen))
-
-    def as_others(self, person: Person, index: int) -> float:
-        """Odds that a sight is one of the others who are known, by its looks; 0 for no sight.
-
-        As :attr:`against` is, they are against any one of those who are away coming back: whoever
-        is known comes back as seldom as the person does.
-        """
-        total = 0.0
-        for row, other in enumerate(self.people[: len(self.looks)] if index >= 0 else []):
-            if other is person or other.gallery.looks is None:
-                continue
-            look: float | None = float(self.looks[row, index])
-            if row in self.owner:
-                if row != self.owner[index]:  # he is elsewhere
-                    continue
-                # That somebody looks as he has since he came tells nothing of who he is.
-                view = self.sights[index].view
-                alike = similarity(view, other.gallery.looks)
-                came = self.time if self.was_away(other) else other.came
-                look = other.gallery.log_odds_before(came, view, alike)
-            if look is not None:
-                total += math.exp(look) * self._is_another(other, person)
-        return total
-
-    def _is_another(self, other: Person, person: Person) -> float:
-        """How likely somebody known is not a person who had gone, under another number, 0 to 1."""
-        alike = other.resemblance(person.number)
-        if alike is None or other.chosen or other.number in person.met:
-            return 1.0
-        return is_new(alike, self.against)
-
-    def room_share(self, seen: Silhouette) -> float:
-        """Share of a silhouette's pixels that show the room, 0 to 1."""
-        counts = self.parts.counts(seen)
-        return counts[ROOM] / sum(counts)
-
-    def _room_beside(self, person: Person, seen: Silhouette) -> float:
-        """Share of a silhouette that stood still while the person was seen elsewhere, 0 to 1."""
-        share = self.room_share(seen)
-        last = person.last
-        if person.mobile or share == 0:
-            return share
-        if last is None:
-            return 0.0
-        y0, y1 = max(seen.rows.start, last.rows.start), min(seen.rows.stop, last.rows.stop)
-        x0, x1 = max(seen.cols.start, last.cols.start), min(seen.cols.stop, last.cols.stop)
-        if y0 >= y1 or x0 >= x1:
-            return share
-        # What the outline of the last sight holds, about as deep, may have been the person.
-        mine = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
-        step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)
-        mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
-        return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
-
-    def others(self, person: Person) -> Others:
-        """The pixels that are surely not a person's.
-
-        They belong to somebody who was seen beside him, or are the room where he is no part of it.
-        """
-        met = [
-            owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
-            for owner in self.owner
-        ]
-        return Others(self.parts, [False, person.mobile, *met])
-
-    def stranger(self, person: Person, index: int) -> Person | None:
-        """Who a sight is taken for, if that may be ``person`` under another number.
-
-        That is somebody who was never seen beside him.
-        """
-        if index < 0 or self.owner[index] < 0:
-            return None
-        other = self.people[self.owner[index]]
-        if other is person or other.chosen or other.number in person.met:
-            return None
-        return other
-
-    def likest(self, newcomer: Person, enough: float = 0.0) -> Person | None:
-        """Who of those that went away before a newcomer came he seems to be, if one of them.
-
-        Args:
-            newcomer: the newcomer.
-            enough: sightings from which that is said, counted by how much showed: a first one alone
-                seldom tells, what several say together does.
-        """
-        # Who once came back unrecognised is known twice: it is the first that he is.
-        alike = [
-            (
-                newcomer.resembles(person.number, enough)
-                + math.log(is_new(person.again, self.against)),
-                index,
-            )
-            for index, person in enumerate(self.people)
-            if person.number not in newcomer.met
-            and (person.chosen or person.seen_at < newcomer.first_seen)
-        ]
-        alike.sort(reverse=True)
-        (odds, index), *others = alike or [(0.0, -1)]
-        if index < 0 or (others and others[0][0] > odds - SAME_AGAIN):
-            return None
-        person = self.people[index]
-        # Who was chosen is waited for, however many others come.
-        return person if odds >= (RETURN if person.chosen else self.against) else None
-
-    def somebody(self) -> npt.NDArray[np.bool_]:
-        """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
-        mask = np.zeros(self.scene.view.shape, np.bool_)
-        for sight, owner in zip(self.sights, self.owner, strict=True):
-            if owner >= 0 and self.people[owner].alive:
-                seen = sight.figure.seen
-                mask[seen.rows, seen.cols] |= seen.mask
-        return mask
-
-
-def absent(gone: float, misses: int) -> bool:
-    """Whether somebody was away, and not only missed once by a slow camera.
-
-    Args:
-        gone: seconds since he was last seen.
-        misses: frames that have shown nothing of him since.
-    """
-    return gone > (REUNION if misses >= MISSES else PAUSE)
 
 
 class Crowd:

@@ -90,7 +90,7 @@ class Comeback:
             others: of all in view who may be the target as well, by their numbers. Of these one is
                 looked at in each frame, who was looked at longest ago.
             known: odds that he is somebody else who is known, see
-                :meth:`~rgbd_kcf_tracker.metric.decide.crowd.Account.as_others`.
+                :meth:`~rgbd_kcf_tracker.metric.decide.account.Account.as_others`.
             time: seconds.
             followed: numbers of those others who are followed themselves: nobody's rivals, as the
                 target is not found again in them.

@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.insight import COMPUTED_BY, Insight, insight_of
-from rgbd_kcf_tracker.metric.decide.crowd import REUNION
+from rgbd_kcf_tracker.metric.decide.account import REUNION
 from rgbd_kcf_tracker.metric.decide.evidence import CUE_WORDS
 from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
