@@ -44,7 +44,8 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
     bounded,
     is_new,
 )
-from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW, NEW_AREA, Crowd
+from rgbd_kcf_tracker.metric.decide.association import NEW
+from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (

@@ -9,7 +9,6 @@ import math
 from collections.abc import Collection
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.account import (
@@ -20,29 +19,21 @@ from rgbd_kcf_tracker.metric.decide.account import (
     Account,
     Sight,
 )
-from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, away, is_new
+from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
+from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Compared, Looks, View
+from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, find_figures
+from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, UPRIGHT, came, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import (
-    GROWN,
-    HEADED,
-    TOP,
-    person_sized,
-    upright,
-)
+from rgbd_kcf_tracker.metric.perceive.upright import HEADED, TOP, person_sized, upright
 from rgbd_kcf_tracker.pose import Pose
 
-NEW = 0.0
-"""Log-odds of being somebody known from which a figure is not somebody new: even ones, as both are
-weighed in what they are made of already."""
 SURE = 1.0
 """Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
 among these the likeliest is enough, for who is known by few views is hardly recognised."""
@@ -72,15 +63,8 @@ bounds time and memory, and is more than come by in most rooms."""
 SETTLED = 3
 """Frames after which the room is known: as many as tell that a pixel has no reading
 (:data:`~.perceive.room.BLIND_FRAMES`), so that before it anything may seem to be new."""
-OF_TWO = 3.0
-"""Log-odds that a look gives at most to who was chosen and was seen a moment ago, one more once he
-is away: a drawn box may hold two things, and what shows of one of them alone is more like both than
-the other is."""
 HELD = -2
 """Owner of a sight that may be a target which was not found: nobody new is made of it."""
-AT_REST = 1.0
-"""Seconds for which a camera must have stood for what comes before the room to have come: one that
-turns to and fro stands for a moment each time."""
 
 
 class Crowd:
@@ -101,8 +85,7 @@ class Crowd:
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
         self._comebacks: dict[int, Comeback] = {}
-        self._known: list[Looks] = []
-        self._everyone: Looks | None = None
+        self._association = Association()
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
@@ -217,7 +200,7 @@ class Crowd:
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
         )
-        odds, looks, alike = self._odds(scene, sights, time, against)
+        odds, looks, alike = self._association.log_odds(self.people, scene, sights, time, against)
         account = Account(
             scene,
             time,
@@ -229,7 +212,7 @@ class Crowd:
             against,
             {n: each.likely.score for n, each in self._comebacks.items() if each.likely},
         )
-        account.verdict = _assigned(odds, len(sights))
+        account.verdict = assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
         # borne out over some sightings who he is.
         missed = [p.chosen and account.was_away(p) for p in self.people]
@@ -241,7 +224,7 @@ class Crowd:
                     # Nor is that sight anybody's who was seen beside him.
                     met = [person.number in self.people[row].met for person in self.people]
                     odds_of_here[met, column] = NEW - 1
-            account.owner = _assigned(odds_of_here, len(sights))
+            account.owner = assigned(odds_of_here, len(sights))
         return account, alike
 
     def _followed(self, account: Account) -> list[Followed]:
@@ -276,51 +259,6 @@ class Crowd:
         if not newcomer.chosen:
             new = {p.number: is_new(p.again, account.against) for p in account.people}
             newcomer.again = newcomer.seen_before(new)
-
-    def _odds(
-        self, scene: Scene, sights: list[Sight], time: float, against: float
-    ) -> tuple[FloatArray, FloatArray, Likeness]:
-        odds = np.zeros((len(self.people), len(sights)))
-        looks = np.zeros_like(odds)
-        alike = np.zeros((0, len(sights)), np.float32)
-        if not odds.size:
-            return odds, looks, alike
-        known = [p.gallery.looks for p in self.people if p.gallery.looks is not None]
-        best: list[list[float]] = []
-        if known:
-            everyone = self._joined(known)
-            compared = [Compared.of(sight.view, everyone) for sight in sights]
-            alike = np.array([each.similarity() for each in compared]).T
-            starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
-            best = np.array([each.of_each(starts) for each in compared]).T.tolist()
-        rows = iter(best)
-        places = np.array([s.figure.place for s in sights])
-        low = np.array([not _came(scene, s.figure.seen) for s in sights])
-        for row, person in enumerate(self.people):
-            likeness = next(rows) if person.gallery.looks is not None else None
-            for column, sight in enumerate(sights):
-                most = None if likeness is None else likeness[column]
-                looks[row, column] = person.gallery.log_odds(sight.view, most)
-            odds[row] = person.place_log_odds(places, time)
-            gone = away(time - person.seen_at)
-            if person.chosen:
-                odds[row] += np.minimum(looks[row], OF_TWO + gone)
-            else:
-                odds[row] += looks[row] - (against + SAME_AGAIN) * gone
-            if low.any() and time - person.seen_at > RECENT and (person.gallery.top or 0.0) > GROWN:
-                odds[row, low] = NEW - 1  # nor does he come back as a desk
-        return odds, looks, alike
-
-    def _joined(self, known: list[Looks]) -> Looks:
-        """All of some looks, which mostly are the same as in the frame before."""
-        last = self._known
-        if (
-            self._everyone is None
-            or len(known) != len(last)
-            or any(now is not before for now, before in zip(known, last, strict=True))
-        ):
-            self._known, self._everyone = known, Looks.joined(known)
-        return self._everyone
 
     def learn(
         self,
@@ -489,7 +427,7 @@ class Crowd:
                 self._came_back(person, person.came, account.against)
         if gone > 0:
             # What comes into view, or out from behind something, seems to walk as more of it shows.
-            walks = scene.stood_for >= AT_REST or (not seen.cut.any and _came(scene, seen))
+            walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
             person.moved_to(place, account.time, walks)
         person.last, person.figure = seen, index >= 0
         if not sure or (scene.since is None and person.gallery.views):
@@ -518,7 +456,7 @@ class Crowd:
                 return
         person.upright = (
             person.upright
-            or (account.settled and person_sized(seen, view.top) and _came(scene, seen))
+            or (account.settled and person_sized(seen, view.top) and came(scene, seen))
             or upright(seen, scene.view.intrinsics, view.top)
         )
         if view.top is not None and view.top > 1.2:
@@ -530,15 +468,6 @@ class Crowd:
         whole = seen.area > WHOLE and headed and alone and apart
         if whole or not person.gallery.views:
             person.gallery.learn(view, account.time)
-
-
-def _came(scene: Scene, seen: Silhouette) -> bool:
-    """Whether what stands before the room has come there, as far as a camera that moved can tell.
-
-    Furniture that it saw anew stands where something nearer, or farther, was known to be.
-    """
-    highest = seen.highest(scene.elevation) if scene.stood_for < AT_REST else None
-    return highest is None or highest > GROWN
 
 
 def _is_head(account: Account, column: int) -> bool:
@@ -560,14 +489,3 @@ def _beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouet
         if one is not None and one.width > STRIP and one.height > UPRIGHT:
             found.append(one)
     return found
-
-
-def _assigned(odds: FloatArray, sights: int) -> list[int]:
-    """For each sight who it is by the assignment that explains most, -1 for somebody new."""
-    owner = [-1] * sights
-    if odds.size:
-        rows, columns = linear_sum_assignment(-np.maximum(odds - NEW, 0))
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-            if odds[row, column] > NEW:
-                owner[column] = row
-    return owner

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, surfaces_in
+from rgbd_kcf_tracker.metric.perceive.upright import GROWN
 
 JUMP, JUMP_PER_METRE = 0.06, 0.04
 """Depth step between two figures: limbs stand off the trunk farther than one surface may step."""
@@ -48,6 +49,9 @@ WIDEST, TALLEST = 0.9, 2.2
 UPRIGHT = 1.0
 """Metres of height of each of two pieces beside each other, together at least :data:`BROAD`, from
 which they are two people: no limb is that tall."""
+AT_REST = 1.0
+"""Seconds for which a camera must have stood for what comes before the room to have come: one that
+turns to and fro stands for a moment each time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,3 +189,12 @@ def place_of(scene: Scene, seen: Silhouette) -> FloatArray:
     middle = np.array([(left + right) / 2, (top + bottom) / 2, seen.depth])
     ahead = float(scene.forward[seen.rows, seen.cols][seen.mask].mean())
     return np.array([scene.axes[0] @ middle, ahead])
+
+
+def came(scene: Scene, seen: Silhouette) -> bool:
+    """Whether what stands before the room has come there, as far as a camera that moved can tell.
+
+    Furniture that it saw anew stands where something nearer, or farther, was known to be.
+    """
+    highest = seen.highest(scene.elevation) if scene.stood_for < AT_REST else None
+    return highest is None or highest > GROWN
