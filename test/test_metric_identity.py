@@ -1214,7 +1214,7 @@ def test_what_was_learned_in_a_return_that_is_not_borne_out_is_taken_back_after_
     watched = Watched()
     one = watched.walk(-1.0, 0.0, 3.0, RED)
     views = len(one.gallery.views)
-    watched.crowd._came_back(one, watched.time, against=10.0)
+    watched.crowd._comebacks.add(one, watched.time, against=10.0)
     one.gallery.learn(look(BLUE, GREY), watched.time + 0.05)
     one.chosen = chosen
     account = watched.see(Someone(0.05, 3.0))

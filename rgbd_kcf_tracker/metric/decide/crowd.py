@@ -21,7 +21,8 @@ from rgbd_kcf_tracker.metric.decide.account import (
 )
 from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
-from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
@@ -84,7 +85,7 @@ class Crowd:
         self._axes = CAMERA_AXES
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
-        self._comebacks: dict[int, Comeback] = {}
+        self._comebacks = Comebacks()
         self._association = Association()
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
@@ -186,7 +187,7 @@ class Crowd:
                 other = self.welcome(mixed_up.first.place, mixed_up.since)
             mixed_up.first.exchange(other, mixed_up.since)
             for person in (mixed_up.first, other):
-                self._comebacks.pop(person.number, None)
+                self._comebacks.drop(person)
             account, _ = self._explained(scene, sights, time)
         for column, row in enumerate(account.owner):
             if row >= 0:
@@ -210,7 +211,7 @@ class Crowd:
             looks,
             self._frames > SETTLED,
             against,
-            {n: each.likely.score for n, each in self._comebacks.items() if each.likely},
+            self._comebacks.sure,
         )
         account.verdict = assigned(odds, len(sights))
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
@@ -314,32 +315,7 @@ class Crowd:
                 person.missed(account.scene.view.depth)
         self._introduce(account, {n: None if n in unsure else s for n, s in targets.items()})
         self._reunite(account)
-        self._bear_out(account)
-
-    def _bear_out(self, account: Account) -> None:
-        """Hear how those who came back, and whom nobody chose, look by what was known before.
-
-        What was learned of them since is taken back where some seconds do not bear it out.
-        """
-        if not self._comebacks:
-            return
-        owners = {account.people[row]: n for n, row in enumerate(account.owner) if row >= 0}
-        here = {p.number: p for p in self.people if not p.chosen}
-        self._comebacks = {n: each for n, each in self._comebacks.items() if n in here}
-        for number, comeback in self._comebacks.items():
-            person = here[number]
-            if person in owners:
-                view = account.sights[owners[person]].view
-                known = account.as_others(person, owners[person])
-                comeback.hear(view, {}, known, account.time)
-            if account.time - comeback.since >= AFTER:
-                comeback.settle(person)
-
-    def _came_back(self, person: Person, since: float, against: float) -> None:
-        """Somebody whom nobody chose came back, at ``since`` seconds."""
-        if person.number in self._comebacks:
-            self._comebacks[person.number].settle(person)
-        self._comebacks[person.number] = Comeback(person, since, against)
+        self._comebacks.hear(account, self.people)
 
     def _reunite(self, account: Account) -> None:
         """Give newcomers the number of whom they have turned out to be.
@@ -358,7 +334,7 @@ class Crowd:
             if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
-            self._came_back(person, newcomer.first_seen, account.against)
+            self._comebacks.add(person, newcomer.first_seen, account.against)
             row = account.people.index(newcomer)
             account.owner = [
                 account.people.index(person) if each == row else each for each in account.owner
@@ -424,7 +400,7 @@ class Crowd:
         if account.was_away(person):
             person.came = account.time
             if person.gallery.views and not person.chosen:
-                self._came_back(person, person.came, account.against)
+                self._comebacks.add(person, person.came, account.against)
         if gone > 0:
             # What comes into view, or out from behind something, seems to walk as more of it shows.
             walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
