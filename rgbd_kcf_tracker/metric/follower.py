@@ -17,10 +17,11 @@ from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, SAME_OUTLINE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
-from rgbd_kcf_tracker.metric.decide.crowd import WHOLE, Crowd
+from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
+from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere

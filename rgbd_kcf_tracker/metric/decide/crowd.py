@@ -23,24 +23,19 @@ from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, View
-from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
+from rgbd_kcf_tracker.metric.identity.gallery import View
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, UPRIGHT, came, find_figures
+from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import HEADED, TOP, person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import TOP
 from rgbd_kcf_tracker.pose import Pose
 
-SURE = 1.0
-"""Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
-among these the likeliest is enough, for who is known by few views is hardly recognised."""
-WHOLE = 0.2
-"""Square metres of a figure from which its view is learned: about a head and a chest. Of less so
-few of the slices show that others have them as well."""
 NEW_AREA = 0.12
 """Square metres of a figure from which it is somebody new: a head and shoulders, twice the least
 that is a figure, for arms and legs that come apart from somebody are no people."""
@@ -49,9 +44,6 @@ HEAD_LEVEL = 1.1
 room that is known and at a distance from everybody else, is somebody new however little of him
 shows beside a monitor or the image's end. From 1.0 m on real people are the same, from 1.3 m on
 those who sit are left out."""
-PART_OF_ROOM = 0.3
-"""Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
-with what is behind, and feet lie as near to the floor as its depth is uncertain."""
 BESIDE = 0.5
 """Metres between two who are surely two, and not a person and a piece of the same: about a
 shoulder's breadth, as no piece of somebody lies farther from his middle."""
@@ -391,8 +383,7 @@ class Crowd:
         self, account: Account, row: int, seen: Silhouette, index: int, sure: bool = True
     ) -> None:
         """Take one sighting of one person."""
-        person, scene = account.people[row], account.scene
-        place = account.place(seen)
+        person = account.people[row]
         gone = account.time - person.seen_at
         # Who was missed only once may have been away, too: how surely, the time says.
         if person.misses and gone > REUNION:
@@ -401,49 +392,7 @@ class Crowd:
             person.came = account.time
             if person.gallery.views and not person.chosen:
                 self._comebacks.add(person, person.came, account.against)
-        if gone > 0:
-            # What comes into view, or out from behind something, seems to walk as more of it shows.
-            walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
-            person.moved_to(place, account.time, walks)
-        person.last, person.figure = seen, index >= 0
-        if not sure or (scene.since is None and person.gallery.views):
-            return
-        person.area = max(person.area, seen.area)
-        # What is small lies as near to the room as the room's depth is uncertain.
-        # Before the room is known anything may seem to stand before it, but not walk.
-        known = account.settled or person.travelled > TRAVELLED
-        if known and not person.mobile and seen.area > WHOLE:
-            before = account.scene.before[seen.rows, seen.cols][seen.mask]
-            person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
-        view = account.look(seen)
-        all_sides = len(person.gallery.views) > ALL_SIDES
-        if index >= 0 and row < len(account.odds):
-            odds, looks = account.odds[:, index].tolist(), account.looks[:, index].tolist()
-            ahead = SURE if person.chosen else 0.0
-            rivals = [
-                theirs + (SURE if other.chosen else ahead)
-                for other, theirs in zip(account.people, odds, strict=False)
-                if other is not person
-            ]
-            # His place may say that it is he, and his look that it is one who is not in view.
-            here = {*account.owner, row}
-            liker = max([0.0, *(look for n, look in enumerate(looks) if n not in here)])
-            if odds[row] < max([ahead, *rivals]) or (all_sides and liker - looks[row] > SURE):
-                return
-        person.upright = (
-            person.upright
-            or (account.settled and person_sized(seen, view.top) and came(scene, seen))
-            or upright(seen, scene.view.intrinsics, view.top)
-        )
-        if view.top is not None and view.top > 1.2:
-            person.gallery.learn_height(view.top, account.time)
-        alone = index < 0 or not account.sights[index].figure.parted
-        headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
-        # Where something nearer cuts somebody off, some of his pixels may be another's.
-        apart = not (all_sides and (seen.cut.left or seen.cut.right))
-        whole = seen.area > WHOLE and headed and alone and apart
-        if whole or not person.gallery.views:
-            person.gallery.learn(view, account.time)
+        learn_sighting(account, row, seen, index, sure)
 
 
 def _is_head(account: Account, column: int) -> bool:

@@ -1,0 +1,81 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What one sighting tells of somebody: where he is, whether he can walk, and how he looks."""
+
+from __future__ import annotations
+
+from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES
+from rgbd_kcf_tracker.metric.identity.person import TRAVELLED
+from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import HEADED, person_sized, upright
+
+SURE = 1.0
+"""Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
+among these the likeliest is enough, for who is known by few views is hardly recognised."""
+WHOLE = 0.2
+"""Square metres of a figure from which its view is learned: about a head and a chest. Of less so
+few of the slices show that others have them as well."""
+PART_OF_ROOM = 0.3
+"""Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
+with what is behind, and feet lie as near to the floor as its depth is uncertain."""
+
+
+def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sure: bool) -> None:
+    """Learn of one person what a sighting tells.
+
+    Args:
+        account: of the frame.
+        row: the person's, among its people.
+        seen: the silhouette.
+        index: of the sight that it is, -1 where it is no figure.
+        sure: whether it is surely that person: else nothing but the place is learned.
+    """
+    person, scene = account.people[row], account.scene
+    place = account.place(seen)
+    gone = account.time - person.seen_at
+    if gone > 0:
+        # What comes into view, or out from behind something, seems to walk as more of it shows.
+        walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
+        person.moved_to(place, account.time, walks)
+    person.last, person.figure = seen, index >= 0
+    if not sure or (scene.since is None and person.gallery.views):
+        return
+    person.area = max(person.area, seen.area)
+    # What is small lies as near to the room as the room's depth is uncertain.
+    # Before the room is known anything may seem to stand before it, but not walk.
+    known = account.settled or person.travelled > TRAVELLED
+    if known and not person.mobile and seen.area > WHOLE:
+        before = account.scene.before[seen.rows, seen.cols][seen.mask]
+        person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
+    view = account.look(seen)
+    all_sides = len(person.gallery.views) > ALL_SIDES
+    if index >= 0 and row < len(account.odds):
+        odds, looks = account.odds[:, index].tolist(), account.looks[:, index].tolist()
+        ahead = SURE if person.chosen else 0.0
+        rivals = [
+            theirs + (SURE if other.chosen else ahead)
+            for other, theirs in zip(account.people, odds, strict=False)
+            if other is not person
+        ]
+        # His place may say that it is he, and his look that it is one who is not in view.
+        here = {*account.owner, row}
+        liker = max([0.0, *(look for n, look in enumerate(looks) if n not in here)])
+        if odds[row] < max([ahead, *rivals]) or (all_sides and liker - looks[row] > SURE):
+            return
+    person.upright = (
+        person.upright
+        or (account.settled and person_sized(seen, view.top) and came(scene, seen))
+        or upright(seen, scene.view.intrinsics, view.top)
+    )
+    if view.top is not None and view.top > 1.2:
+        person.gallery.learn_height(view.top, account.time)
+    alone = index < 0 or not account.sights[index].figure.parted
+    headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
+    # Where something nearer cuts somebody off, some of his pixels may be another's.
+    apart = not (all_sides and (seen.cut.left or seen.cut.right))
+    whole = seen.area > WHOLE and headed and alone and apart
+    if whole or not person.gallery.views:
+        person.gallery.learn(view, account.time)
