@@ -47,6 +47,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
 from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
@@ -72,6 +73,7 @@ from rgbd_kcf_tracker.metric.identity.stood import (
     SUDDENLY,
     Stood,
 )
+from rgbd_kcf_tracker.metric.initialisation import surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -1303,10 +1305,10 @@ def test_surface_of_a_box_is_the_one_it_is_drawn_about():
     left, right = Someone(-0.6, 3.0, RED), Someone(0.6, 3.0, BLUE)
     account = watched.see(left, right)
     for one in (left, right):
-        seen = BySurface.surface_of(account, one.box, MetricParameters())
+        seen = surface_of(account, one.box, MetricParameters())
         assert seen is not None
-        assert BySurface.outline(account.scene, seen).iou(one.box) > 0.9
-    assert BySurface.surface_of(account, Box(5, 5, 20, 20), MetricParameters()) is None
+        assert box_about(account.scene, seen).iou(one.box) > 0.9
+    assert surface_of(account, Box(5, 5, 20, 20), MetricParameters()) is None
 
 
 @pytest.mark.parametrize(
@@ -1319,7 +1321,7 @@ def test_a_figure_that_lies_in_the_box_is_the_target_though_limbs_are_missing(le
     x, y, width, height = one.box.as_tuple()
     drawn = Box(x + left * width, y, wide * width, height)
     assert one.box.iou(drawn) < 0.5
-    assert (BySurface.surface_of(account, drawn, MetricParameters()) is not None) == taken
+    assert (surface_of(account, drawn, MetricParameters()) is not None) == taken
 
 
 def test_what_sticks_out_of_the_given_box_is_not_the_target():
@@ -1327,9 +1329,9 @@ def test_what_sticks_out_of_the_given_box_is_not_the_target():
     one = Someone(0.0, 3.0, RED)
     account = watched.see(one)
     upper = Box(one.box.x, one.box.y, one.box.width, 0.7 * one.box.height)
-    seen = BySurface.surface_of(account, upper, MetricParameters())
+    seen = surface_of(account, upper, MetricParameters())
     assert seen is not None
-    assert BySurface.outline(account.scene, seen).iou(upper) > 0.85
+    assert box_about(account.scene, seen).iou(upper) > 0.85
 
 
 def test_who_passes_before_a_half_hidden_target_is_not_taken_for_it():
@@ -1372,7 +1374,7 @@ def test_what_shows_behind_a_target_that_touches_a_door_frame_is_not_the_target(
     x0, x1 = round(one.box.x), round(one.box.right)
     depth[:, :x0] = depth[:, x1:] = one.z + 0.05  # all but the door
     scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
-    seen = BySurface.surface_of(Crowd().explain(scene, 0.0), one.box, MetricParameters())
+    seen = surface_of(Crowd().explain(scene, 0.0), one.box, MetricParameters())
     assert seen is None or seen.depth == pytest.approx(one.z, abs=0.1)
 
 
@@ -1382,7 +1384,7 @@ def test_a_target_that_shows_in_a_gap_between_two_who_are_nearer_is_not_they():
     strip = depth[45:115, 106:134]
     strip[(strip > 3.5) | (np.random.default_rng(1).random(strip.shape) > 0.3)] = np.nan
     scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
-    seen = BySurface.surface_of(Crowd().explain(scene, 0.0), box, MetricParameters())
+    seen = surface_of(Crowd().explain(scene, 0.0), box, MetricParameters())
     assert seen is not None
     assert seen.depth == pytest.approx(3.5, abs=0.1)
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.account import MISSES, SMALL, Account, absent
+from rgbd_kcf_tracker.metric.decide.account import MISSES, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import (
     FADE,
@@ -34,7 +34,7 @@ from rgbd_kcf_tracker.metric.decide.proposals import (
     gathered,
     propose,
 )
-from rgbd_kcf_tracker.metric.decide.visible_box import visible_box
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about, visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
 from rgbd_kcf_tracker.metric.identity.middle import Belief, MiddleFilter
@@ -47,25 +47,6 @@ from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
-LOCK_IOU = 0.5
-"""Overlap of the given box with a surface's from which the surface is taken for the target: from
-which a box counts as right in the benchmarks, too (PASCAL VOC)."""
-SAME_OUTLINE = 0.7
-"""Overlap of two outlines from which they are of one thing and not of a part of it. At 0.35 a mug
-in a hand became the person, at 0.5 a face the body below it (docs/metric.md)."""
-PART_IOU, INSIDE = 0.35, 0.9
-"""The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
-LEAST_FILL = 0.5
-"""Share of the given box that a surface fills of which the box shows only a part: the greater part
-of it, or the box is about something else."""
-SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
-"""Share of the given box that the scattered readings of a target fill, at the least; share of a
-piece that lies in the box from which it is the target's; and metres between the target's readings,
-arms and a far reading's noise included."""
-OUTSIDE = 0.1
-"""Share of the given box by which a silhouette may stick out of it on each side: boxes are drawn no
-better by hand, and outlines in depth lie beside those in colour. What is farther out is somebody
-else who touches the target, or what it stands on."""
 FIRST_SIGMA = 0.05
 """Metres by which the first place is unsure: the target was shown, so it is no more than the body's
 own relief near the camera, which is :data:`~.identity.body.DEPTH_SIGMA`."""
@@ -169,147 +150,6 @@ class BySurface:
         self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
         self._learn_around(scene, first, None)
 
-    @staticmethod
-    def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silhouette | None:
-        """The figure or surface that a box of the image is drawn about, None where none fits."""
-        scene = account.scene
-        whole = BySurface.whole_of(account, box)
-        if whole is not None:
-            return BySurface._within(scene, whole, box)
-        piece = BySurface._piece_of(scene, box)
-        if piece is not None and BySurface._found_again(account, piece, parameters):
-            return piece
-        return BySurface._scattered(scene, box)
-
-    @staticmethod
-    def whole_of(account: Account, box: Box) -> Silhouette | None:
-        """The figure or surface as large as a box, with what of it lies beside the box as well."""
-        figure = BySurface._figure_of(account, box)
-        if figure is not None:
-            return figure
-        scene = account.scene
-        rows, cols = scene.view.shape
-        b = box.over(scene.view.step).clipped(cols, rows)
-        if b is None:
-            return None
-        boxes = scene.surfaces.boxes.astype(np.float64)
-        across = np.minimum(boxes[:, 0] + boxes[:, 2], b.right) - np.maximum(boxes[:, 0], b.x)
-        down = np.minimum(boxes[:, 1] + boxes[:, 3], b.bottom) - np.maximum(boxes[:, 1], b.y)
-        common = np.clip(across, 0, None) * np.clip(down, 0, None)
-        iou = common / (boxes[:, 2] * boxes[:, 3] + b.area - common)
-        iou[0] = 0
-        # A wall behind may fill the box as well: it must be the surface that the box shows.
-        iou *= BySurface._shown(scene, box) > 0
-        label = int(np.argmax(iou))
-        return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
-
-    @staticmethod
-    def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
-        """The part of a surface that a box shows: two who touch are one surface."""
-        shown = BySurface._shown(scene, box)
-        total = shown.sum()
-        shown[0] = 0
-        label = int(np.argmax(shown))
-        large = scene.surfaces.pixels[label] > MOST_SHARE * total
-        if large or shown[label] < max(1.0, LEAST_FILL * total):
-            return None
-        part = BySurface._within(scene, scene.silhouette(label), box)
-        return part if BySurface.outline(scene, part).iou(box) >= LOCK_IOU else None
-
-    @staticmethod
-    def _found_again(account: Account, piece: Silhouette, parameters: MetricParameters) -> bool:
-        """Whether the very frame in which a piece was chosen offers it, as the next would have to.
-
-        Who touches somebody is told from him, a head not from what it is a part of.
-        """
-        scene = account.scene
-        nobody = Person(0, account.place(piece), account.time)
-        followed = BySurface(account, piece, nobody, parameters)
-        found = propose(
-            scene,
-            followed.body,
-            followed._expected(0.0),
-            account.others(nobody),
-            parameters.most_candidates,
-        )
-        outline = BySurface.outline(scene, piece)
-        return any(BySurface.outline(scene, seen).iou(outline) > SAME_OUTLINE for seen in found)
-
-    @staticmethod
-    def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
-        """``(k,)`` how many pixels of each surface a box shows."""
-        b, (rows, cols) = box.over(scene.view.step), scene.view.shape
-        x0, x1 = np.clip((math.floor(b.x), math.ceil(b.right)), 0, cols)
-        y0, y1 = np.clip((math.floor(b.y), math.ceil(b.bottom)), 0, rows)
-        labels = scene.surfaces.labels[y0:y1, x0:x1]
-        return np.bincount(labels.ravel(), minlength=len(scene.surfaces))
-
-    @staticmethod
-    def _figure_of(account: Account, box: Box) -> Silhouette | None:
-        """The figure that a box is drawn about, of which limbs may be missing."""
-        figures = [sight.figure.seen for sight in account.sights]
-        if not figures:
-            return None
-        outlines = [BySurface.outline(account.scene, seen) for seen in figures]
-        overlaps = [outline.iou(box) for outline in outlines]
-        best = int(np.argmax(overlaps))
-        inside = box.intersection(outlines[best]) > INSIDE * outlines[best].area
-        return figures[best] if overlaps[best] >= (PART_IOU if inside else LOCK_IOU) else None
-
-    @staticmethod
-    def _scattered(scene: Scene, box: Box) -> Silhouette | None:
-        """The few readings of somebody far off, or of whom little shows, that a box is drawn about.
-
-        They stand before the room at about one depth, and belong to nothing that goes on beside it.
-        """
-        step, (rows, cols) = scene.view.step, scene.view.shape
-        x0, x1 = max(0, round(box.x / step)), min(cols, round(box.right / step))
-        y0, y1 = max(0, round(box.y / step)), min(rows, round(box.bottom / step))
-        part = slice(y0, y1), slice(x0, x1)
-        mine = scene.standing[part].copy()
-        if np.count_nonzero(mine) < SCATTERED * mine.size:
-            return None
-        labels = scene.surfaces.labels[part]
-        inside = np.bincount(labels[mine], minlength=len(scene.surfaces))
-        inside[0] = scene.surfaces.pixels[0]  # pieces too small to be surfaces
-        mine &= (inside > OWN * scene.surfaces.pixels)[labels]
-        depth = scene.view.depth[part]
-        if not mine.any():
-            return None
-        bins = np.bincount((depth[mine] / THICK).astype(np.intp))
-        # Behind the target the same gap may show more.
-        nearest = int(np.flatnonzero(bins > 0.5 * bins.max())[0])
-        mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
-        if np.count_nonzero(mine) < SCATTERED * mine.size:
-            return None
-        # Where the middle of the box shows something nearer, they are of what is behind the target.
-        nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)
-        down, across = mine.shape[0] // 4, mine.shape[1] // 4
-        middle = np.s_[down : mine.shape[0] - down, across : mine.shape[1] - across]
-        if np.count_nonzero(nearer[middle]) > np.count_nonzero(mine[middle]):
-            return None
-        seen = Silhouette.trimmed(scene.view, x0, y0, mine, scene.rim)
-        if seen is None:
-            return None
-        # What little depth there is of a small thing in a hand may be the hand's.
-        if seen.width * seen.height < SMALL or BySurface.outline(scene, seen).iou(box) < LOCK_IOU:
-            return None
-        return seen
-
-    @staticmethod
-    def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
-        """The part of a silhouette in the box that was drawn: what sticks out is something else."""
-        step, margin = scene.view.step, OUTSIDE
-        spare_x, spare_y = margin * box.width, margin * box.height
-        x0 = max(seen.left, int((box.x - spare_x) / step))
-        x1 = min(seen.cols.stop, int((box.right + spare_x) / step) + 1)
-        y0 = max(seen.top, int((box.y - spare_y) / step))
-        y1 = min(seen.rows.stop, int((box.bottom + spare_y) / step) + 1)
-        if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
-            return seen
-        part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
-        return Silhouette.trimmed(scene.view, x0, y0, part, scene.rim) or seen
-
     # -- one frame --------------------------------------------------------------------------------
 
     def step(self, account: Account, frame: Frame, dt: float) -> Candidate | None:
@@ -337,7 +177,7 @@ class BySurface:
             self._cloud = None
         elif self._parameters.use_particles:
             self._step_cloud(scene, dt)
-        expected = self._expected(dt)
+        expected = self.expected(dt)
         missing = self._should_be_seen(scene) > 0.6
         others = account.others(self._person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
@@ -482,16 +322,10 @@ class BySurface:
         place = view.intrinsics.deproject(box.cx / view.step, box.y / view.step, z)
         return np.array(place), np.array([0.1, 0.1, 10.0])
 
-    @staticmethod
-    def outline(scene: Scene, seen: Silhouette) -> Box:
-        """The box about a silhouette in pixels of the image."""
-        step = scene.view.step
-        rows, cols = seen.mask.shape
-        return Box(seen.left * step, seen.top * step, cols * step, rows * step)
-
     # -- parts ------------------------------------------------------------------------------------
 
-    def _expected(self, dt: float) -> Expectation:
+    def expected(self, dt: float) -> Expectation:
+        """Where the target is expected now, ``dt`` seconds after the frame before."""
         sigma = self.motion.sigma
         reach = 3.0 * np.minimum(sigma, 1.5) + 0.2 + 1.5 * STRIDE_PER_SECOND * min(dt, 0.3)
         if self.hidden_for > self._parameters.lost_after:
@@ -514,7 +348,7 @@ class BySurface:
     def _weighed(
         self, account: Account, frame: Frame, found: list[Silhouette], dt: float, missing: bool
     ) -> list[Candidate]:
-        boxes = [self.outline(account.scene, seen) for seen in found] if self._cues else []
+        boxes = [box_about(account.scene, seen) for seen in found] if self._cues else []
         said = [
             [Said(cue.name, value, cue.weight) for value in values.tolist()]
             for cue in self._cues

@@ -14,7 +14,7 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
-from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, SAME_OUTLINE, BySurface, Candidate
+from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
-from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
+from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, surface_of, whole_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -220,7 +221,7 @@ class Follower:
     # -- by surface -------------------------------------------------------------------------------
 
     def _lock(self, frame: Frame, account: Account, box: Box) -> None:
-        seen = BySurface.surface_of(account, box, self._parameters)
+        seen = surface_of(account, box, self._parameters)
         if seen is None:
             return
         self.seen = seen
@@ -290,7 +291,7 @@ class Follower:
             return self._tracked(frame, box, score, whole.depth, self._belief())
         box = surface.take(account.scene, found)
         self.seen = found.seen
-        outline = BySurface.outline(account.scene, found.seen)
+        outline = box_about(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
         if self.person is not None and score >= LEARNED:
             for cue in self._cues:
@@ -506,7 +507,7 @@ class Follower:
             return False
         if _area(account.scene.view, look) < SMALL:
             return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
-        outlines = (BySurface.outline(account.scene, s.figure.seen) for s in account.sights)
+        outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
     def _agree(self, frame: Frame, account: Account, look: Look | None) -> bool:
@@ -518,11 +519,8 @@ class Follower:
         if look is None:
             self._agreed = 0
             return False
-        whole = BySurface.whole_of(account, look.box)
-        if (
-            whole is not None
-            and BySurface.outline(account.scene, whole).iou(look.box) > SAME_OUTLINE
-        ):
+        whole = whole_of(account, look.box)
+        if whole is not None and box_about(account.scene, whole).iou(look.box) > SAME_OUTLINE:
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:
                 self._lock(frame, account, look.box)
@@ -551,7 +549,7 @@ class Follower:
             if sight.figure.parted:  # where it ends is a guess
                 continue
             seen, scene = sight.figure.seen, account.scene
-            outline = BySurface.outline(scene, seen)
+            outline = box_about(scene, seen)
             ends = _ends(outline, scene)
             shown, least = _to_side(outline, ends, scene), outline.area
             if self._ends is not None and (
@@ -690,7 +688,7 @@ def _people_beside(account: Account, box: Box) -> set[int]:
     return {
         account.people[owner].number
         for owner, sight in zip(account.owner, account.sights, strict=True)
-        if owner >= 0 and BySurface.outline(account.scene, sight.figure.seen).intersection(box) == 0
+        if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
     }
 
 

@@ -29,6 +29,13 @@ and trunk shows as much of what is behind. At 0.18 and 0.35 the means over the r
 same."""
 
 
+def box_about(scene: Scene, seen: Silhouette) -> Box:
+    """The box about a silhouette in pixels of the image."""
+    step = scene.view.step
+    rows, cols = seen.mask.shape
+    return Box(seen.left * step, seen.top * step, cols * step, rows * step)
+
+
 def outline_box(scene: Scene, seen: Silhouette) -> Box:
     """The box of a silhouette in pixels of the image, of whose body nothing more is known.
 
