@@ -32,7 +32,7 @@ from rgbd_kcf_tracker import Box, Frame, create_tracker
 from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
-from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface
+from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
 from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight
 from rgbd_kcf_tracker.metric.decide.arrivals import (
@@ -48,6 +48,7 @@ from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,

@@ -52,9 +52,6 @@ FIRST_SIGMA = 0.05
 own relief near the camera, which is :data:`~.identity.body.DEPTH_SIGMA`."""
 HIDDEN_NOISE = 0.5
 """Process noise of a hidden target's motion against a visible one's."""
-ELSEWHERE = 0.0
-"""Log-odds, by where it stood, below which a look is that of something else, as it is less likely
-there than anywhere. At -1 another chair was it once the camera's own way was less sure."""
 STRIDE = 0.5
 STRIDE_PER_SECOND = 2.0
 """Metres, and metres a second, that a target may also have moved at will, against what its motion

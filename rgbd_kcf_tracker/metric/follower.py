@@ -8,23 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
-from rgbd_kcf_tracker.metric.by_surface import ELSEWHERE, BySurface, Candidate
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look
+from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
-from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
+from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
-from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE, Elsewhere
+from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
@@ -34,20 +31,13 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, surface_of, whole_of
+from rgbd_kcf_tracker.metric.initialisation import surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.scene import Scene
-from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
 
-LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
-"""Metres, and shares of its width, by which the middle of a box found by look is off the target's:
-cells of the filter are a tenth of it, and depth is that of any of its sides."""
-ABOUT = 1.5
-"""Times its size that the surroundings of a box are in which depth is read of what has none: a
-quarter of it on each side, where what holds or carries it shows."""
 LEARNED = 0.6
 """Score from which a target's look is learned from where it was found: below, it may well be
 somebody else, who would be the target from then on."""
@@ -62,8 +52,6 @@ PART_SEEN = 0.8
 five are right on simulated scenes, and most of the others are on the little that shows of him."""
 SUREST_LOOK = 0.9
 """Score of a box found by look at full response: on colour alone about nine of ten are right."""
-RELOCK_FRAMES = 3
-"""Frames on end in which what the look finds must be a surface to go over to it."""
 RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 """Sightings of a returning target, and seconds of them, after which it is the target for good, and
 the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz half a second, as
@@ -72,24 +60,6 @@ sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the di
 DISOWNED = 0.25
 """Probability that who came back is the target, by looks alone, below which he is somebody else
 after all: 3 to 1, as he was taken once already, on more than this."""
-IS_ROOM = 0.6
-"""Share of a box's middle that shows the room from which it is taken to be no more than that: of a
-thin target's box up to half shows what is behind."""
-NEWCOMER = 1.5
-"""Seconds after the last look at a target without a surface in which somebody new may be it: the
-next frame at 1 Hz, late ones as well; afterwards anybody may have come."""
-NEWCOMER_AREA = 0.1
-"""Square metres of him, at the least: a head and shoulders; less is a piece of anything."""
-COVERED = 0.6
-"""Share of a newcomer's outline that lies in the target's box, at the least: more than half, so
-that it is not he who stands beside it, but not all, as he may have moved on by a part of his
-width."""
-WALK, WALKED = 1.4, 0.5
-"""Metres a second by which that box reaches farther to both sides once the look is lost, and for
-how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
-LIKELY = 0.6
-"""Mean probability of his pixels' colours to be the target's, at the least: 0.5 is that of colours
-which were never seen."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or
@@ -97,12 +67,6 @@ somebody who touches it."""
 TALL, TALLER = 0.9, 1.2
 """Metres of height of an upright part of somebody, half of him seen past a corner, and of somebody:
 no chair's back reaches as high as the latter."""
-READ = 0.5
-"""Share of a box's middle that has depth from which depth tells what is there: half, since what has
-no reading may be the target."""
-OUTLINED = 0.5
-"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it: from
-which a box counts as right (PASCAL VOC)."""
 NEW_SCORE = 0.8
 """Score of a box when the target has just been found to be a newcomer: place and colours fit, but
 nothing has borne it out yet."""
@@ -144,15 +108,9 @@ class Follower:
         self._surface: BySurface | None = None
         self._account: Account | None = None
         self._hidden_for = 0.0
-        self._agreed = 0
-        self._unseen = 0.0
-        self._mobile = self._carried = self._partial = False
+        self._partial = False
         self._since = crowd.time
-        self._about: frozenset[int] = frozenset()
-        self._beside: set[int] = set()
-        self._ends: Sides | None = None
         self._elsewhere = Elsewhere()
-        self._stood: Stood | None = None
         self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
@@ -161,12 +119,14 @@ class Follower:
         self.response: float | None = None
         if account is not None:
             self._lock(frame, account, box)
-            self._mobile = account.settled and _room_share(account, box) < 1 - IS_ROOM
-            self._about = _people_about(account, box)
-            self._ends = _ends(box, account.scene)
         self._look: ByLook | None = None
+        self._gated: GatedLook | None = None
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
+            if self._surface is None:
+                self._gated = GatedLook(
+                    self._look, account, box, self._since, parameters.seen_ratio
+                )
         belief = self._belief()
         self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
@@ -220,7 +180,7 @@ class Follower:
 
     # -- by surface -------------------------------------------------------------------------------
 
-    def _lock(self, frame: Frame, account: Account, box: Box) -> None:
+    def _lock(self, frame: Frame, account: Account, box: Box, stood: Stood | None = None) -> None:
         seen = surface_of(account, box, self._parameters)
         if seen is None:
             return
@@ -229,9 +189,7 @@ class Follower:
             self.person = self._crowd.chosen(account, seen)
             for cue in self._cues:
                 cue.start(frame, box, self.person.number)
-        self._surface = BySurface(
-            account, seen, self.person, self._parameters, self._cues, self._stood
-        )
+        self._surface = BySurface(account, seen, self.person, self._parameters, self._cues, stood)
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
 
     def _depth_of_surface(self) -> float | None:
@@ -406,175 +364,24 @@ class Follower:
             return False
         scene = account.scene
         return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
-            self.person is not None and self.person.mobile and _room_share(account, box) > IS_ROOM
+            self.person is not None and self.person.mobile and room_share(account, box) > IS_ROOM
         )
 
     # -- by look ----------------------------------------------------------------------------------
 
     def _by_look(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Track:
-        assert self._look is not None
-        if account is not None:
-            self._carried |= account.scene.motion is not None
-            if self._stood is not None:
-                self._stood.carried(account.scene.way, dt)
-        look, stood = self._look.step(frame, dt, turn), 0.0
-        if look is not None and account is not None:
-            # Where depth does not show it either, a look that has become unlike is something else;
-            # but depth says nothing of what has no reading.
-            silent = look.depth is None and self._look.last_depth is None
-            unlike = look.ratio < self._parameters.seen_ratio and not silent
-            unlike = unlike and not self._goes_on(account, look)
-            reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
-            if unlike or any(refused(account, look) for refused in reasons):
-                self._look.refuse(frame, look)
-                look = None
-        if look is not None:
-            self._look.take(frame, look, dt)
-            at = None if account is None else _place(account.scene.view, look)
-            if at is not None:
-                place, sigma, width = at
-                if self._stood is None:
-                    self._stood = Stood(place, sigma, width)
-                self._stood.seen(place, sigma, dt)
-                stood = self._stood.log_odds(place, sigma)
-            if account is not None:
-                self._beside |= _people_beside(account, look.box)
-            self._unseen, self._carried = 0.0, False
-        else:
-            self._unseen += dt
-        # He came at some time since the frame before, that is in time where that was.
-        in_time = self._unseen - dt < NEWCOMER
-        # What is not where the target stood may be followed, but is not what it is known by.
-        if stood < 0:
-            self._agreed = 0
-        elif account is not None and in_time and self._agree(frame, account, look):
-            assert self._surface is not None
-            assert self.seen is not None
-            box = outline_box(account.scene, self.seen)
-            return self._tracked(frame, box, NEW_SCORE, self.seen.depth, self._surface.belief())
-        if look is None:
+        assert self._gated is not None
+        said = self._gated.step(frame, account, dt, turn)
+        if account is not None and said.onto is not None:
+            self._lock(frame, account, said.onto, self._gated.stood)
+            if self._surface is not None:
+                assert self.seen is not None
+                box = outline_box(account.scene, self.seen)
+                return self._tracked(frame, box, NEW_SCORE, self.seen.depth, self._surface.belief())
+        if said.look is None:
             return self._hidden(frame, dt)
-        return self._tracked(frame, look.box, _score(look, stood), look.depth)
-
-    @property
-    def _last_box(self) -> Box:
-        assert self._look is not None
-        return self._look.last_box
-
-    def _goes_on(self, account: Account, look: Look) -> bool:
-        """Whether depth shows something as near as the target was a frame ago, before the room."""
-        assert self._look is not None
-        near = self._unseen == 0 and as_near(look.depth, self._look.last_depth)
-        if not near or look.box.intersection(self._last_box) == 0:
-            return False
-        before = account.scene.before[_part(account.scene, look.box)]
-        stands = np.count_nonzero(before) >= (1 - IS_ROOM) * before.size > 0
-        return bool(stands or not account.settled)
-
-    def _stood_elsewhere(self, account: Account, look: Look) -> bool:
-        """Whether what is found elsewhere is not where the target, which does not move, stood."""
-        at = _place(account.scene.view, look)
-        followed = self._unseen == 0 and look.box.intersection(self._last_box) > 0
-        if self._stood is None or followed or at is None:
-            return False
-        return self._stood.log_odds(*at[:2]) < ELSEWHERE
-
-    def _stands(self, account: Account, look: Look) -> bool:
-        """Whether a target that can move by itself would be what has always stood there."""
-        return self._mobile and _room_share(account, look.box) > IS_ROOM
-
-    def _taken(self, account: Account, look: Look) -> bool:
-        """Whether a box shows somebody who was there before the target was chosen."""
-        pixels = account.parts.kinds[_part(account.scene, look.box)]
-        index = account.sight_among(account.parts.counted(pixels.ravel()))
-        if index < 0 or account.owner[index] < 0:
-            return False
-        owner = account.people[account.owner[index]]
-        return owner.first_seen <= self._since and owner.number not in self._about
-
-    def _far(self, account: Account, look: Look) -> bool:
-        """Whether a box elsewhere than the target was is no figure, though depth tells of it.
-
-        What fits in the hands is no figure anywhere: carried, it is a part of one, and wherever it
-        is put down it stands before the room.
-        """
-        box = look.box
-        if self._carried or not account.settled or box.intersection(self._last_box) > 0:
-            return False
-        part = _part(account.scene, box)
-        depth = account.scene.view.depth[part]
-        if np.count_nonzero(depth) < READ * depth.size:
-            return False
-        if _area(account.scene.view, look) < SMALL:
-            return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
-        outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
-        return all(outline.iou(box) < OUTLINED for outline in outlines)
-
-    def _agree(self, frame: Frame, account: Account, look: Look | None) -> bool:
-        """Go over to the surface once one has borne out the look, or somebody new is there."""
-        newcomer = self._newcomer(account)
-        if newcomer is not None:
-            self._lock(frame, account, newcomer)
-            return self._surface is not None
-        if look is None:
-            self._agreed = 0
-            return False
-        whole = whole_of(account, look.box)
-        if whole is not None and box_about(account.scene, whole).iou(look.box) > SAME_OUTLINE:
-            self._agreed += 1
-            if self._agreed >= RELOCK_FRAMES:
-                self._lock(frame, account, look.box)
-                return self._surface is not None
-        else:
-            self._agreed = 0
-        return False
-
-    def _newcomer(self, account: Account) -> Box | None:
-        """The outline of who has come into sight where the target was, None for nobody.
-
-        Of a target that comes in at the image's edge, or from behind something, only a part was
-        chosen; depth often begins some way inside of the image.
-        """
-        best, likest = None, 0.0
-        if self._stood is not None and self._stood.known:  # what stands still does not come
-            return None
-        for column, sight in enumerate(account.sights):
-            row = account.owner[column]
-            person = account.people[row] if row >= 0 else None
-            known = person is not None and (
-                person.first_seen <= self._since or person.number in self._beside
-            )
-            if known and account.looks[row, column] > 0:
-                continue
-            if sight.figure.parted:  # where it ends is a guess
-                continue
-            seen, scene = sight.figure.seen, account.scene
-            outline = box_about(scene, seen)
-            ends = _ends(outline, scene)
-            shown, least = _to_side(outline, ends, scene), outline.area
-            if self._ends is not None and (
-                (ends.left and self._ends.left) or (ends.right and self._ends.right)
-            ):
-                least = min(shown.area, self._last_box.area)
-            # Who has taken a step shows whole: a first piece of him is little to know him by.
-            reach = self._last_box if seen.area < WHOLE else self._reach(scene, seen.depth)
-            if (
-                seen.area < NEWCOMER_AREA
-                or shown.intersection(reach) < COVERED * least
-                or shown.iou(self._last_box) < likest
-            ):
-                continue
-            # Somebody else may come in before the target: he has other colours.
-            colors = scene.image[seen.rows, seen.cols]
-            if self._look is None or self._look.likely(colors, seen.mask) >= LIKELY:
-                best, likest = outline, shown.iou(self._last_box)
-        return best
-
-    def _reach(self, scene: Scene, depth: float) -> Box:
-        """Where a target at that depth may have walked to from where its look was lost."""
-        b, pixels = self._last_box, scene.view.intrinsics.fx * scene.view.step / depth
-        step = WALK * min(self._unseen, WALKED) * pixels
-        return Box(b.x - step, b.y, b.width + 2 * step, b.height)
+        score = _score(said.look, said.stood)
+        return self._tracked(frame, said.look.box, score, said.look.depth)
 
     # -- answers ----------------------------------------------------------------------------------
 
@@ -627,72 +434,3 @@ def _score(look: Look, stood: float) -> float:
     """
     ratio = PART_SEEN if look.moved else float(min(max(look.ratio, 0.0), SUREST_LOOK))
     return ratio if stood >= 0 else 1 / (1 + math.exp(-logit(ratio) - stood))
-
-
-def _ends(box: Box, scene: Scene) -> Sides:
-    """The sides at which a box reaches the end of what depth sees."""
-    b = box.over(scene.view.step)
-    return scene.rim.reached(b.x, b.y, b.right, b.bottom, scene.view)
-
-
-def _to_side(outline: Box, ends: Sides, scene: Scene) -> Box:
-    """An outline that ends where depth does, up to the image's own end."""
-    left = 0.0 if ends.left else outline.x
-    right = float(scene.view.shape[1] * scene.view.step) if ends.right else outline.right
-    return Box.from_corners(left, outline.y, right, outline.bottom)
-
-
-def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
-    """Rows and columns of the view that the middle of a box covers."""
-    b = box.scaled(MIDDLE).over(scene.view.step)
-    return scene.view.part(b.x, b.y, b.right, b.bottom)
-
-
-def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:
-    """Where the middle of what was found is, ``(3,)`` metres, how surely, and its width there.
-
-    What has no reading itself is about as deep as what is read beside it, as far as that agrees.
-    None where nothing is.
-    """
-    box, depth, spread = look.box, look.depth, 0.0
-    if depth is None:
-        b = box.scaled(ABOUT).over(view.step)
-        read = view.depth[view.part(b.x, b.y, b.right, b.bottom)]
-        read = read[read > 0]
-        if not read.size:
-            return None
-        low, depth, high = np.percentile(read, (16, 50, 84)).tolist()
-        spread = (high - low) / 2
-    place = np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
-    width = box.width / view.step * depth / view.intrinsics.fx
-    aside = np.abs(place) / depth * spread
-    return place, np.hypot(LOOK_OFF + LOOK_OFF_SHARE * width, aside), width
-
-
-def _area(view: DepthView, look: Look) -> float:
-    """Square metres of what was found, seen from the camera; infinite where it has no reading."""
-    k = view.intrinsics
-    pixels = look.box.area / view.step**2
-    return math.inf if look.depth is None else pixels * look.depth**2 / (k.fx * k.fy)
-
-
-def _people_about(account: Account, box: Box) -> frozenset[int]:
-    """Numbers of all of whom something shows in a box: the target may be any of them."""
-    kinds = np.unique(account.parts.kinds[_part(account.scene, box)])
-    owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
-    return frozenset(account.people[owner].number for owner in owners if owner >= 0)
-
-
-def _people_beside(account: Account, box: Box) -> set[int]:
-    """Numbers of all who show beside a box: the target is in it, whoever passes it later."""
-    return {
-        account.people[owner].number
-        for owner, sight in zip(account.owner, account.sights, strict=True)
-        if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
-    }
-
-
-def _room_share(account: Account, box: Box) -> float:
-    """Share of the middle of a box that shows the room."""
-    part = account.scene.still[_part(account.scene, box)]
-    return float(part.mean()) if part.size else 0.0

@@ -1,0 +1,260 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Following a target by its look, as far as depth has nothing against it.
+
+What the look finds is gated by what depth tells there, until a surface, or somebody new who is one,
+can be followed instead.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
+from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
+from rgbd_kcf_tracker.metric.decide.parts import FIRST
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
+from rgbd_kcf_tracker.metric.identity.stood import Stood
+from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
+from rgbd_kcf_tracker.metric.newcomers import Newcomers
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+
+LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
+"""Metres, and shares of its width, by which the middle of a box found by look is off the target's:
+cells of the filter are a tenth of it, and depth is that of any of its sides."""
+ABOUT = 1.5
+"""Times its size that the surroundings of a box are in which depth is read of what has none: a
+quarter of it on each side, where what holds or carries it shows."""
+ELSEWHERE = 0.0
+"""Log-odds, by where it stood, below which a look is that of something else, as it is less likely
+there than anywhere. At -1 another chair was it once the camera's own way was less sure."""
+RELOCK_FRAMES = 3
+"""Frames on end in which what the look finds must be a surface to go over to it."""
+IS_ROOM = 0.6
+"""Share of a box's middle that shows the room from which it is taken to be no more than that: of a
+thin target's box up to half shows what is behind."""
+NEWCOMER = 1.5
+"""Seconds after the last look at a target without a surface in which somebody new may be it: the
+next frame at 1 Hz, late ones as well; afterwards anybody may have come."""
+READ = 0.5
+"""Share of a box's middle that has depth from which depth tells what is there: half, since what has
+no reading may be the target."""
+OUTLINED = 0.5
+"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it: from
+which a box counts as right (PASCAL VOC)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gated:
+    """What a frame says of a target that is followed by its look.
+
+    Attributes:
+        look: where it is found, None where it is hidden.
+        stood: log-odds of that place by where the target stood; 0 where that is not known.
+        onto: the box of what is to be followed by its surface from now on, None for nothing.
+    """
+
+    look: Look | None
+    stood: float
+    onto: Box | None
+
+
+class GatedLook:
+    """Follows one target by its look.
+
+    Args:
+        look: that follows it.
+        account: of the frame in which it was chosen; None where that has no depth.
+        box: the target in it.
+        since: seconds of that frame.
+        seen_ratio: see :class:`MetricParameters`.
+
+    Attributes:
+        stood: where the target stands; None where that is not known.
+    """
+
+    def __init__(
+        self, look: ByLook, account: Account | None, box: Box, since: float, seen_ratio: float
+    ) -> None:
+        self._look, self._since, self._seen_ratio = look, since, seen_ratio
+        self._newcomers = Newcomers(account, box, since)
+        self._agreed, self._unseen = 0, 0.0
+        self._mobile = self._carried = False
+        self._about: frozenset[int] = frozenset()
+        self.stood: Stood | None = None
+        if account is not None:
+            self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
+            self._about = _people_about(account, box)
+
+    def step(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Gated:
+        """Look for the target in the next ``frame``, ``dt`` seconds later.
+
+        Args:
+            frame: the frame.
+            account: what it shows, None where it has no depth.
+            dt: seconds.
+            turn: whether it may be searched for and learned from.
+        """
+        if account is not None:
+            self._carried |= account.scene.motion is not None
+            if self.stood is not None:
+                self.stood.carried(account.scene.way, dt)
+        look, stood = self._look.step(frame, dt, turn), 0.0
+        if look is not None and account is not None and self._refused(account, look):
+            self._look.refuse(frame, look)
+            look = None
+        if look is not None:
+            self._look.take(frame, look, dt)
+            at = None if account is None else _place(account.scene.view, look)
+            if at is not None:
+                place, sigma, width = at
+                if self.stood is None:
+                    self.stood = Stood(place, sigma, width)
+                self.stood.seen(place, sigma, dt)
+                stood = self.stood.log_odds(place, sigma)
+            if account is not None:
+                self._newcomers.keep(account, look.box)
+            self._unseen, self._carried = 0.0, False
+        else:
+            self._unseen += dt
+        onto = None
+        # He came at some time since the frame before, that is in time where that was.
+        in_time = self._unseen - dt < NEWCOMER
+        # What is not where the target stood may be followed, but is not what it is known by.
+        if stood < 0:
+            self._agreed = 0
+        elif account is not None and in_time:
+            onto = self._onto(account, look)
+        return Gated(look, stood, onto)
+
+    def _refused(self, account: Account, look: Look) -> bool:
+        """Whether depth says that what is found is not the target."""
+        # Where depth does not show it either, a look that has become unlike is something else;
+        # but depth says nothing of what has no reading.
+        silent = look.depth is None and self._look.last_depth is None
+        unlike = look.ratio < self._seen_ratio and not silent
+        unlike = unlike and not self._goes_on(account, look)
+        reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
+        return unlike or any(refused(account, look) for refused in reasons)
+
+    def _goes_on(self, account: Account, look: Look) -> bool:
+        """Whether depth shows something as near as the target was a frame ago, before the room."""
+        near = self._unseen == 0 and as_near(look.depth, self._look.last_depth)
+        if not near or look.box.intersection(self._look.last_box) == 0:
+            return False
+        before = account.scene.before[_part(account.scene, look.box)]
+        stands = np.count_nonzero(before) >= (1 - IS_ROOM) * before.size > 0
+        return bool(stands or not account.settled)
+
+    def _stood_elsewhere(self, account: Account, look: Look) -> bool:
+        """Whether what is found elsewhere is not where the target, which does not move, stood."""
+        at = _place(account.scene.view, look)
+        followed = self._unseen == 0 and look.box.intersection(self._look.last_box) > 0
+        if self.stood is None or followed or at is None:
+            return False
+        return self.stood.log_odds(*at[:2]) < ELSEWHERE
+
+    def _stands(self, account: Account, look: Look) -> bool:
+        """Whether a target that can move by itself would be what has always stood there."""
+        return self._mobile and room_share(account, look.box) > IS_ROOM
+
+    def _taken(self, account: Account, look: Look) -> bool:
+        """Whether a box shows somebody who was there before the target was chosen."""
+        pixels = account.parts.kinds[_part(account.scene, look.box)]
+        index = account.sight_among(account.parts.counted(pixels.ravel()))
+        if index < 0 or account.owner[index] < 0:
+            return False
+        owner = account.people[account.owner[index]]
+        return owner.first_seen <= self._since and owner.number not in self._about
+
+    def _far(self, account: Account, look: Look) -> bool:
+        """Whether a box elsewhere than the target was is no figure, though depth tells of it.
+
+        What fits in the hands is no figure anywhere: carried, it is a part of one, and wherever it
+        is put down it stands before the room.
+        """
+        box = look.box
+        if self._carried or not account.settled or box.intersection(self._look.last_box) > 0:
+            return False
+        part = _part(account.scene, box)
+        depth = account.scene.view.depth[part]
+        if np.count_nonzero(depth) < READ * depth.size:
+            return False
+        if _area(account.scene.view, look) < SMALL:
+            return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
+        outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
+        return all(outline.iou(box) < OUTLINED for outline in outlines)
+
+    def _onto(self, account: Account, look: Look | None) -> Box | None:
+        """The box of a surface that has borne out the look, or of somebody new who is there."""
+        if self.stood is None or not self.stood.known:  # what stands still does not come
+            newcomer = self._newcomers.find(account, self._look, self._unseen)
+            if newcomer is not None:
+                return newcomer
+        if look is None:
+            self._agreed = 0
+            return None
+        whole = whole_of(account, look.box)
+        if whole is not None and box_about(account.scene, whole).iou(look.box) > SAME_OUTLINE:
+            self._agreed += 1
+            if self._agreed >= RELOCK_FRAMES:
+                return look.box
+        else:
+            self._agreed = 0
+        return None
+
+
+def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
+    """Rows and columns of the view that the middle of a box covers."""
+    b = box.scaled(MIDDLE).over(scene.view.step)
+    return scene.view.part(b.x, b.y, b.right, b.bottom)
+
+
+def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:
+    """Where the middle of what was found is, ``(3,)`` metres, how surely, and its width there.
+
+    What has no reading itself is about as deep as what is read beside it, as far as that agrees.
+    None where nothing is.
+    """
+    box, depth, spread = look.box, look.depth, 0.0
+    if depth is None:
+        b = box.scaled(ABOUT).over(view.step)
+        read = view.depth[view.part(b.x, b.y, b.right, b.bottom)]
+        read = read[read > 0]
+        if not read.size:
+            return None
+        low, depth, high = np.percentile(read, (16, 50, 84)).tolist()
+        spread = (high - low) / 2
+    place = np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
+    width = box.width / view.step * depth / view.intrinsics.fx
+    aside = np.abs(place) / depth * spread
+    return place, np.hypot(LOOK_OFF + LOOK_OFF_SHARE * width, aside), width
+
+
+def _area(view: DepthView, look: Look) -> float:
+    """Square metres of what was found, seen from the camera; infinite where it has no reading."""
+    k = view.intrinsics
+    pixels = look.box.area / view.step**2
+    return math.inf if look.depth is None else pixels * look.depth**2 / (k.fx * k.fy)
+
+
+def _people_about(account: Account, box: Box) -> frozenset[int]:
+    """Numbers of all of whom something shows in a box: the target may be any of them."""
+    kinds = np.unique(account.parts.kinds[_part(account.scene, box)])
+    owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
+    return frozenset(account.people[owner].number for owner in owners if owner >= 0)
+
+
+def room_share(account: Account, box: Box) -> float:
+    """Share of the middle of a box that shows the room."""
+    part = account.scene.still[_part(account.scene, box)]
+    return float(part.mean()) if part.size else 0.0

@@ -1,0 +1,115 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who has come into sight where a target without a surface was, and may be it.
+
+Of a target that comes in at the image's edge, or from behind something, only a part was chosen;
+depth often begins some way inside of the image.
+"""
+
+from __future__ import annotations
+
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Sides
+
+NEWCOMER_AREA = 0.1
+"""Square metres of him, at the least: a head and shoulders; less is a piece of anything."""
+COVERED = 0.6
+"""Share of a newcomer's outline that lies in the target's box, at the least: more than half, so
+that it is not he who stands beside it, but not all, as he may have moved on by a part of his
+width."""
+WALK, WALKED = 1.4, 0.5
+"""Metres a second by which that box reaches farther to both sides once the look is lost, and for
+how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
+LIKELY = 0.6
+"""Mean probability of his pixels' colours to be the target's, at the least: 0.5 is that of colours
+which were never seen."""
+
+
+class Newcomers:
+    """Tells who is new from those who were there, or beside the target, before.
+
+    Args:
+        account: of the frame in which the target was chosen; None where that has no depth.
+        box: the target in it.
+        since: seconds of that frame.
+    """
+
+    def __init__(self, account: Account | None, box: Box, since: float) -> None:
+        self._since = since
+        self._beside: set[int] = set()
+        self._ends: Sides | None = None if account is None else _ends(box, account.scene)
+
+    def keep(self, account: Account, box: Box) -> None:
+        """Take where the target is: all who show beside it are others, whoever passes it later."""
+        self._beside |= {
+            account.people[owner].number
+            for owner, sight in zip(account.owner, account.sights, strict=True)
+            if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
+        }
+
+    def find(self, account: Account, look: ByLook, unseen: float) -> Box | None:
+        """The outline of who may be the target, None for nobody.
+
+        Args:
+            account: of the frame.
+            look: of the target.
+            unseen: seconds since it was last found.
+        """
+        best, likest, last = None, 0.0, look.last_box
+        for column, sight in enumerate(account.sights):
+            row = account.owner[column]
+            person = account.people[row] if row >= 0 else None
+            known = person is not None and (
+                person.first_seen <= self._since or person.number in self._beside
+            )
+            if known and account.looks[row, column] > 0:
+                continue
+            if sight.figure.parted:  # where it ends is a guess
+                continue
+            seen, scene = sight.figure.seen, account.scene
+            outline = box_about(scene, seen)
+            ends = _ends(outline, scene)
+            shown, least = _to_side(outline, ends, scene), outline.area
+            if self._ends is not None and (
+                (ends.left and self._ends.left) or (ends.right and self._ends.right)
+            ):
+                least = min(shown.area, last.area)
+            # Who has taken a step shows whole: a first piece of him is little to know him by.
+            reach = last if seen.area < WHOLE else _reach(last, scene, seen.depth, unseen)
+            if (
+                seen.area < NEWCOMER_AREA
+                or shown.intersection(reach) < COVERED * least
+                or shown.iou(last) < likest
+            ):
+                continue
+            # Somebody else may come in before the target: he has other colours.
+            colors = scene.image[seen.rows, seen.cols]
+            if look.likely(colors, seen.mask) >= LIKELY:
+                best, likest = outline, shown.iou(last)
+        return best
+
+
+def _reach(last: Box, scene: Scene, depth: float, unseen: float) -> Box:
+    """Where a target at that depth may have walked to from its last box."""
+    pixels = scene.view.intrinsics.fx * scene.view.step / depth
+    step = WALK * min(unseen, WALKED) * pixels
+    return Box(last.x - step, last.y, last.width + 2 * step, last.height)
+
+
+def _ends(box: Box, scene: Scene) -> Sides:
+    """The sides at which a box reaches the end of what depth sees."""
+    b = box.over(scene.view.step)
+    return scene.rim.reached(b.x, b.y, b.right, b.bottom, scene.view)
+
+
+def _to_side(outline: Box, ends: Sides, scene: Scene) -> Box:
+    """An outline that ends where depth does, up to the image's own end."""
+    left = 0.0 if ends.left else outline.x
+    right = float(scene.view.shape[1] * scene.view.step) if ends.right else outline.right
+    return Box.from_corners(left, outline.y, right, outline.bottom)
