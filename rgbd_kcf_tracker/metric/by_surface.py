@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
@@ -26,6 +25,7 @@ from rgbd_kcf_tracker.metric.decide.evidence import (
     logit,
     probability,
 )
+from rgbd_kcf_tracker.metric.decide.expected_body import ExpectedBody
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import (
     MIXED,
@@ -175,7 +175,7 @@ class BySurface:
         elif self._parameters.use_particles:
             self._step_cloud(scene, dt)
         expected = self.expected(dt)
-        missing = self._should_be_seen(scene) > 0.6
+        missing = self.expected_body.visible(scene) > 0.6
         others = account.others(self._person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
         # Where his own figure is known, what holds somebody else besides is no proposal.
@@ -290,7 +290,7 @@ class BySurface:
     def miss(self, scene: Scene | None, dt: float) -> None:
         """Go on without having found the target."""
         if scene is not None and self.hidden_for < LEAVING:
-            self._gone = max(self._gone, self._outside(scene))
+            self._gone = max(self._gone, self.expected_body.outside(scene))
         self.hidden_for += dt
         self._misses += 1
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
@@ -308,6 +308,11 @@ class BySurface:
         """Where the middle of the target is, ``(3,)`` metres in the camera's frame."""
         x, top, z = self.motion.position.tolist()
         return np.array([x, top + self.body.height / 2, z])
+
+    @property
+    def expected_body(self) -> ExpectedBody:
+        """All of the target where it is expected."""
+        return ExpectedBody(self.motion.position, self.body.width, self.body.height)
 
     def stood_at(self, view: DepthView, box: Box) -> float:
         """Log-odds, by where it stood, that the target is in a box of the image."""
@@ -410,57 +415,9 @@ class BySurface:
         stranger = account.stranger(self._person, account.sight_of(seen))
         return stranger is not None and stranger.entered
 
-    def _outline(self, view: DepthView) -> tuple[float, float, float, float]:
-        """Where the whole body is expected: left, top, right, bottom in pixels of the view."""
-        k = view.intrinsics
-        x, y, z = self.motion.position.tolist()
-        half = self.body.width / 2
-        return (
-            (x - half) * k.fx / z + k.cx,
-            y * k.fy / z + k.cy,
-            (x + half) * k.fx / z + k.cx,
-            (y + self.body.height) * k.fy / z + k.cy,
-        )
-
-    def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
-        """Depth where the body is expected, and the pixels it would have if none were outside."""
-        if self.motion.position[2] < 0.3:
-            return np.zeros((0, 0), np.float32), 1.0
-        left, top, right, bottom = self._outline(scene.view)
-        total = max(1.0, (right - left + 1) * (bottom - top + 1))
-        return scene.view.depth[scene.view.part(left, top, right, bottom)], total
-
-    def _should_be_seen(self, scene: Scene) -> float:
-        """Share of the expected body that nothing nearer, no hole and no image edge hides."""
-        depth, total = self._inside(scene)
-        return np.count_nonzero(depth > self.motion.position[2] - 0.15) / total
-
-    def _outside(self, scene: Scene) -> float:
-        """Share of the expected body that lies beyond the left and right edges of the image."""
-        if self.motion.position[2] < 0.3:
-            return 1.0
-        left, _, right, _ = self._outline(scene.view)
-        first, last = scene.rim.left, scene.view.shape[1] - scene.rim.right
-        inside = min(right, last) - max(left, first)
-        return min(max(1.0 - inside / max(right - left, 1.0), 0.0), 1.0)
-
-    def without_depth(self, scene: Scene) -> float:
-        """Share of the expected body, as far as it lies in the image, that has no reading."""
-        depth, total = self._inside(scene)
-        if depth.size < 0.2 * total:
-            return 0.0
-        return 1.0 - np.count_nonzero(depth) / depth.size
-
-    def expected_box(self, view: DepthView) -> Box | None:
-        """The whole body where it is expected, in pixels of the image."""
-        if self.motion.position[2] < 0.3:
-            return None
-        left, top, right, bottom = (v * view.step for v in self._outline(view))
-        return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))
-
     def _learn_around(self, scene: Scene, seen: Silhouette, dt: float | None) -> None:
         """Learn the colours beside the target."""
-        left, top, right, bottom = self._outline(scene.view)
+        left, top, right, bottom = self.expected_body.sides(scene.view)
         rows, cols = scene.view.shape
         wide = right - left
         x0 = int(min(max(left - wide, 0), cols - 2))

@@ -337,8 +337,8 @@ class Follower:
         """Where depth shows nothing of the target, see whether its look is where it should be."""
         scene = None if account is None else account.scene
         if self._look is not None and view is not None:
-            box = surface.expected_box(view)
-            blind = scene is None or surface.without_depth(scene) > BLIND
+            box = surface.expected_body.box(view)
+            blind = scene is None or surface.expected_body.unread(scene) > BLIND
             # Who was away need not be where he was expected: what is like him may be anything.
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
