@@ -8,9 +8,13 @@ from __future__ import annotations
 import ast
 import os
 import shutil
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -134,6 +138,34 @@ def test_a_job_that_kills_its_process_fails_alone_and_only_after_another_try(tmp
     assert 'worker died each time' in str(done[3].error)
     assert [n for n, d in done.items() if d.error is not None] == [3]
     assert done[5].result == 5
+
+
+BUSY_AND_IDLE = """
+import time
+from rgbd_kcf_tracker.batch.workers import LocalPool
+pool = LocalPool(2)
+pool.submit(time.sleep, 600)
+pool.submit(abs, 1).result()
+print('both are there', flush=True)
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_the_process_that_started_them(number: int):
+    with subprocess.Popen(
+        [sys.executable, '-c', BUSY_AND_IDLE], stdout=subprocess.PIPE, start_new_session=True,
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)},
+    ) as process:  # fmt: skip
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == b'both are there\n'
+            process.send_signal(number)
+            process.communicate(timeout=20)  # they hold the same pipe
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == -number
 
 
 def test_an_executor_that_breaks_and_cannot_be_replaced_ends_the_run_with_one_error():

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from types import TracebackType
 from typing import TypeVar
 
@@ -140,7 +141,9 @@ class LocalPool(Workers):
     def submit(self, function: Callable[[T], R], item: T) -> Future[R]:
         """Hand out one job."""
         if self._pool is None:
-            self._pool = ProcessPoolExecutor(self._count, mp_context=get_context('spawn'))
+            self._pool = ProcessPoolExecutor(
+                self._count, mp_context=get_context('spawn'), initializer=_end_with_parent
+            )
         with _interrupts_for_us():
             return self._pool.submit(function, item)
 
@@ -181,6 +184,24 @@ def cores() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on this system
         return os.cpu_count() or 1
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it is gone, be it killed.
+
+    A worker waits for its next job on a pipe that the workers beside it hold open, too: it would
+    wait for ever, and so would whoever reads the output that it has inherited. What it was writing
+    is as after a crash: whole under its name, or a part that the next run clears away.
+    """
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, name='parent', daemon=True).start()
 
 
 @contextmanager
