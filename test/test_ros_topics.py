@@ -147,6 +147,8 @@ def test_qos_can_be_overridden_by_ros_own_parameters(rig: Rig) -> None:
         rig.await_listener()
         (info,) = rig.node.get_subscriptions_info_by_topic('/color/image')
         assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+        (info,) = rig.node.get_subscriptions_info_by_topic('/depth/image')
+        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT, 'of one topic alone'
         assert 'bad_parameters' not in rig.fresh_values()
 
 

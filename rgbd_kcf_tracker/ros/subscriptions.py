@@ -50,7 +50,6 @@ class Subscriptions:
         remove: Callable[[Any], None],
     ) -> None:
         self._node = node
-        qos = image_qos(settings)
         overriding = QoSOverridingOptions.with_default_policies()
         self._topics: dict[str, str] = {}
         self._all: list[Any] = []
@@ -67,7 +66,7 @@ class Subscriptions:
                 kind,
                 name,
                 callback,
-                qos,
+                image_qos(settings),
                 event_callbacks=NO_EVENTS,
                 qos_overriding_options=overriding,
             )
@@ -77,7 +76,7 @@ class Subscriptions:
             CameraInfo,
             CAMERA_INFO,
             camera_info,
-            qos,
+            image_qos(settings),
             event_callbacks=NO_EVENTS,
             qos_overriding_options=overriding,
         )
