@@ -6,18 +6,20 @@
 from __future__ import annotations
 
 import time
-from itertools import islice
+from itertools import count, islice
 
 import cv2
 import pytest
 
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
+import rclpy
 from geometry_msgs.msg import Point, PointStamped
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_rig import FOCAL, Rig, box_text, running_node, scene, stamp_of, tracker_process
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import CameraInfo, CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker.recordings.images import decode_color
@@ -137,6 +139,54 @@ def test_publishers_of_either_reliability_are_heard(rig: Rig, reliability: str) 
         rig.play_until_heard(0)
         rig.play(range(1, 10))
         assert rig.box().iou(scene(9)[2]) > 0.6
+
+
+def test_publishers_that_cannot_be_heard_are_told(
+    rig: Rig, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Each once on the log with what mends it, and in diagnostics for as long as it is so."""
+    best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    for publisher in (rig.color, rig.depth, rig.init):
+        rig.node.destroy_publisher(publisher)
+    rig.color = rig.node.create_publisher(Image, 'color/image', best_effort)
+    context = rclpy.Context()  # of its own: Fast DDS has one type for a topic in each
+    rclpy.init(context=context)
+    other = Node('other', context=context)
+    other.create_publisher(CompressedImage, 'depth/image', 10)
+    rig.node.create_publisher(RegionOfInterest, '/tracker/init', best_effort)
+    color = (
+        '/rig publishes best effort on /color/image, where reliable is asked for: '
+        'set reliability:=best_effort'
+    )
+    depth = (
+        '/other publishes sensor_msgs/msg/CompressedImage on /depth/image, not '
+        'sensor_msgs/msg/Image: remap depth/image, or set depth_transport'
+    )
+    init = (
+        '/rig publishes best effort on /tracker/init, where reliable is asked for: '
+        'publish it reliable'
+    )
+    with running_node(rig, wait=False, reliability='reliable'):
+        silent = f'no image on /color/image yet: {color}'
+        rig.wait(lambda: rig.values().get('message') == silent, 20, 'why')
+        rig.fresh_values()  # it is on the log when it was so twice
+        rig.node.destroy_publisher(rig.color)
+        rig.color = rig.node.create_publisher(Image, 'color/image', 10)
+        indices = count()
+
+        def told() -> bool:
+            rig.send_info()
+            rig.send_color(next(indices))
+            time.sleep(0.02)
+            message = rig.values()['message']
+            return f'no depth image on /depth/image: {depth}' in message and init in message
+
+        rig.wait(told, 20, 'the others')
+        assert rig.values()['level'] == '1'
+    other.destroy_node()
+    rclpy.shutdown(context=context)
+    said = capfd.readouterr().err
+    assert [said.count(words) for words in (color, depth, init)] == [1, 1, 1]
 
 
 def test_qos_can_be_overridden_by_ros_own_parameters(rig: Rig) -> None:

@@ -144,6 +144,11 @@ class Intake:
         """Whether nothing waits, so that :meth:`poll` has nothing to do."""
         return not self._arrivals and not self._held
 
+    @property
+    def camera_known(self) -> bool:
+        """Whether the camera has said anything of itself."""
+        return self._camera is not None
+
     def camera_info(self, camera: Camera, arrival_ns: int) -> list[Capture]:
         """Take in what the camera says of itself; returns what waited for it."""
         self._camera = camera

@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from rgbd_kcf_tracker.live.statistics import Snapshot
+from rgbd_kcf_tracker.ros.subscriptions import COLOR, DEPTH
 from rgbd_kcf_tracker.track import TrackState
 
 RECENT_ERROR_S = 5.0
@@ -33,6 +35,7 @@ class NodeState:
         stale_after: seconds without images that make a silent camera.
         uses_depth: whether the variant wants depth at all.
         depth_fault: why no depth fits, in words; empty where it does.
+        unheard: by input, why one who publishes there is not heard, and what mends it.
     """
 
     name: str
@@ -46,6 +49,7 @@ class NodeState:
     stale_after: float = 2.0
     uses_depth: bool = True
     depth_fault: str = ''
+    unheard: Mapping[str, str] = field(default_factory=dict)
 
 
 def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
@@ -60,6 +64,7 @@ def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
     came = max(snapshot.recent.get('color_received', 0), 1)
     # Images that wait for a depth that never comes are dropped too: the cause is said first.
     wrong = [error, _without_depth(state, snapshot, came), _dropped(snapshot, came)]
+    wrong += [why for name, why in state.unheard.items() if name not in (COLOR, DEPTH)]
     if any(wrong):
         return DiagnosticStatus.WARN, '; '.join(text for text in wrong if text)
     return DiagnosticStatus.OK, state.track.name
@@ -72,9 +77,11 @@ def _silence(state: NodeState, snapshot: Snapshot) -> str:
     if state.publishers == 0:
         return f'nobody publishes {state.topic}: is the camera running, is the topic remapped?'
     since = 'yet' if age is None else f'for {age:.1f} s'
+    if COLOR in state.unheard:
+        return f'no image on {state.topic} {since}: {state.unheard[COLOR]}'
     return (
         f'no image on {state.topic} {since}, though it has a publisher: is the driver working, '
-        'does its QoS fit (see reliability)?'
+        'are images lost on the way?'
     )
 
 
@@ -93,7 +100,8 @@ def _without_depth(state: NodeState, snapshot: Snapshot, came: int) -> str:
         return f'nobody publishes {state.depth_topic}: tracking on colour alone'
     age = snapshot.depth_age_s
     if age is None or age > state.stale_after:
-        return f'no depth image on {state.depth_topic}: tracking on colour alone'
+        why = state.unheard.get(DEPTH, 'tracking on colour alone')
+        return f'no depth image on {state.depth_topic}: {why}'
     if state.depth_fault:
         return f'tracking on colour alone: {state.depth_fault}'
     return (

@@ -17,8 +17,10 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
+from rgbd_kcf_tracker.ros.unheard import unheard
 
 COLOR, DEPTH, CAMERA_INFO = 'color/image', 'depth/image', 'color/camera_info'
+REQUESTS = ('~/init', '~/init_point', '~/add', '~/remove')
 REQUEST_DEPTH = 10
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 """They cost time with each message (see publishers), and diagnostics say what is silent."""
@@ -49,10 +51,9 @@ class Subscriptions:
         add: Callable[[Any], None],
         remove: Callable[[Any], None],
     ) -> None:
-        self._node = node
+        self._node, self._settings = node, settings
         overriding = QoSOverridingOptions.with_default_policies()
-        self._topics: dict[str, str] = {}
-        self._all: list[Any] = []
+        self._all: dict[str, Any] = {}
         for topic, transport, callback in (
             (COLOR, settings.color_transport, color),
             (DEPTH, settings.depth_transport, depth),
@@ -62,7 +63,7 @@ class Subscriptions:
             if transport != RAW:
                 kind = CompressedImage
                 name = f'{node.resolve_topic_name(topic)}/{transport}'
-            made = node.create_subscription(
+            self._all[topic] = node.create_subscription(
                 kind,
                 name,
                 callback,
@@ -70,9 +71,7 @@ class Subscriptions:
                 event_callbacks=NO_EVENTS,
                 qos_overriding_options=overriding,
             )
-            self._topics[topic] = made.topic_name
-            self._all.append(made)
-        info = node.create_subscription(
+        self._all[CAMERA_INFO] = node.create_subscription(
             CameraInfo,
             CAMERA_INFO,
             camera_info,
@@ -80,35 +79,47 @@ class Subscriptions:
             event_callbacks=NO_EVENTS,
             qos_overriding_options=overriding,
         )
-        self._topics[CAMERA_INFO] = info.topic_name
-        self._all.append(info)
-        for kind, request, callback in (
-            (RegionOfInterest, '~/init', init),
-            (PointStamped, '~/init_point', init_point),
-            (RegionOfInterest, '~/add', add),
-            (UInt32, '~/remove', remove),
+        for request, kind, callback in zip(
+            REQUESTS,
+            (RegionOfInterest, PointStamped, RegionOfInterest, UInt32),
+            (init, init_point, add, remove),
+            strict=True,
         ):
-            self._all.append(
-                node.create_subscription(
-                    kind, request, callback, REQUEST_DEPTH, event_callbacks=NO_EVENTS
-                )
+            self._all[request] = node.create_subscription(
+                kind, request, callback, REQUEST_DEPTH, event_callbacks=NO_EVENTS
             )
 
     def topic(self, name: str) -> str:
         """The full name of an input after remapping."""
-        return self._topics[name]
+        return str(self._all[name].topic_name)
 
     def publishers(self) -> dict[str, int]:
         """How many publish on each input."""
-        return {name: self._node.count_publishers(topic) for name, topic in self._topics.items()}
+        names = COLOR, DEPTH, CAMERA_INFO
+        return {name: self._node.count_publishers(self.topic(name)) for name in names}
+
+    def unheard(self, name: str) -> str:
+        """Why a publisher of an input is not heard, and what mends it; empty where all are."""
+        made = self._all[name]
+        if not self._node.count_publishers(made.topic_name):
+            return ''
+        if name in REQUESTS:
+            return unheard(self._node, made, 'publish that', 'publish it reliable')
+        cure_type = f'remap {name}'
+        if name != CAMERA_INFO:
+            cure_type += f', or set {name.partition("/")[0]}_transport'
+        cure = 'reliability:=best_effort'
+        if made.qos_profile.reliability != image_qos(self._settings).reliability:
+            cure = f'qos_overrides.{made.topic_name}.subscription.{cure}'
+        return unheard(self._node, made, cure_type, f'set {cure}')
 
     def describe(self) -> str:
         """The image topics, for the log."""
-        return f'{self._topics[COLOR]} and {self._topics[DEPTH]}'
+        return f'{self.topic(COLOR)} and {self.topic(DEPTH)}'
 
     def destroy(self) -> None:
         """Listen no more."""
-        for made in self._all:
+        for made in self._all.values():
             self._node.destroy_subscription(made)
         self._all.clear()
 

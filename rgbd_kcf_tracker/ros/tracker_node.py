@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.live.intake import Intake
 from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session, warm_up
 from rgbd_kcf_tracker.live.settings import ALL, NodeParameters
-from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.statistics import Snapshot, Statistics
 from rgbd_kcf_tracker.live.story import Allowance
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
@@ -35,7 +35,13 @@ from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
 from rgbd_kcf_tracker.ros.requests import REJECTED, Requests
-from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH, Subscriptions
+from rgbd_kcf_tracker.ros.subscriptions import (
+    CAMERA_INFO,
+    COLOR,
+    DEPTH,
+    REQUESTS,
+    Subscriptions,
+)
 from rgbd_kcf_tracker.ros.transforms import Transforms
 from rgbd_kcf_tracker.track import TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
@@ -77,6 +83,8 @@ class TrackerNode(LifecycleNode):
         self._reset_service: Any = None
         self._refusals = Allowance(MOST_REFUSALS, REFUSALS_A_SECOND)
         self._logged: dict[str, float] = {}
+        self._unheard: set[str] = set()
+        self._unheard_told: set[str] = set()
         try:
             self._parameters_server = ParameterServer(self, self._parameters_changed)
         except RgbdKcfError:
@@ -363,11 +371,37 @@ class TrackerNode(LifecycleNode):
 
     def _publish_diagnostics(self) -> None:
         snapshot = self.statistics.snapshot()
+        state = self._state(snapshot)
+        self._tell_unheard(set(state.unheard.values()))
         self._diagnostics.publish(
-            diagnostics_message(self.get_clock().now().to_msg(), self._state(), snapshot)
+            diagnostics_message(self.get_clock().now().to_msg(), state, snapshot)
         )
 
-    def _state(self) -> NodeState:
+    def _tell_unheard(self, now: set[str]) -> None:
+        """Warn of what was so the last time, too: of a new publisher not all is known at once.
+
+        Once each, as it lasts until somebody mends it; again where it was mended meanwhile.
+        """
+        lasting = now & self._unheard
+        for why in sorted(lasting - self._unheard_told):
+            self.get_logger().warning(why)
+        self._unheard, self._unheard_told = now, lasting
+
+    def _unheard_now(self, snapshot: Snapshot) -> dict[str, str]:
+        """Why nothing comes on inputs on which somebody publishes."""
+        if self._session is None or self._inputs is None or self._intake is None:
+            return {}
+        ages = {COLOR: snapshot.image_age_s}
+        if VARIANTS[self._session.variant].uses_depth:
+            ages[DEPTH] = snapshot.depth_age_s
+        oldest = self._settings.stale_after
+        silent = [*REQUESTS, *(n for n, age in ages.items() if age is None or age > oldest)]
+        if not self._intake.camera_known:
+            silent.append(CAMERA_INFO)
+        found = {name: self._inputs.unheard(name) for name in silent}
+        return {name: why for name, why in found.items() if why}
+
+    def _state(self, snapshot: Snapshot) -> NodeState:
         name = self.get_fully_qualified_name()
         lifecycle = self._lifecycle()
         session, wired = self._session, self._inputs
@@ -390,4 +424,5 @@ class TrackerNode(LifecycleNode):
             stale_after=self._settings.stale_after,
             uses_depth=VARIANTS[session.variant].uses_depth,
             depth_fault=self._intake.fit.fault if self._intake is not None else '',
+            unheard=self._unheard_now(snapshot),
         )
