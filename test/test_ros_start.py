@@ -24,6 +24,7 @@ from rclpy.lifecycle import LifecycleNode
 
 from rgbd_kcf_tracker.ros import (
     follow_main,
+    follow_node,
     replay_main,
     replay_node,
     tracker_main,
@@ -93,6 +94,35 @@ def test_a_tracker_refuses_wrong_parameters(
 ) -> None:
     assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures('_process')
+@pytest.mark.parametrize(
+    ('program', 'name', 'value'),
+    [
+        ('viewer', 'tracker', "'bad name!'"),
+        ('viewer', 'tracker', "''"),
+        ('viewer', 'tracker', '/'),
+        ('follow', 'tracker', "'bad name'"),
+        ('follow', 'pose_topic', "'/pose/'"),
+        ('follow', 'action', "'9x y'"),
+        ('replay', 'answer_topic', "'9x y'"),
+    ],
+)
+def test_what_is_no_name_is_refused(
+    program: str, name: str, value: str, capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    if program not in MAINS:
+        pytest.skip("needs pip install '.[view]'")
+    monkeypatch.setattr('rgbd_kcf_tracker.ros.process.spin', pytest.fail)
+    monkeypatch.setattr(follow_node, 'action_type', lambda: None)
+    assert MAINS[program](['--ros-args', '-p', f'{name}:={value}']) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    text = value.strip("'")
+    begin = f'{program}: parameter {name} is {text!r}, which is no name in ROS (must not '
+    assert line.startswith(begin)
+    assert ': give one such as /' in line
 
 
 @pytest.mark.usefixtures('_process')

@@ -22,6 +22,7 @@ from std_srvs.srv import Trigger
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.live.following import Following, FollowParameters
 from rgbd_kcf_tracker.parameters import describe
+from rgbd_kcf_tracker.ros.names import full_name, tracker_topics
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
 PERIOD_S = 0.1
@@ -72,8 +73,11 @@ class FollowNode(Node):
         given = {name: self.get_parameter(name).value for name in infos}
         self.settings = FollowParameters(**given)
         self.following = Following(self.settings)
-        tracker = self.settings.tracker.rstrip('/')
-        self.pose_topic = self.resolve_topic_name(self.settings.pose_topic or f'{tracker}/pose')
+        tracker = tracker_topics(self, self.settings.tracker)
+        self.pose_topic = full_name(
+            self, 'pose_topic', self.settings.pose_topic or f'{tracker}/pose', '/tracker/pose'
+        )
+        full_name(self, 'action', self.settings.action, '/follow_object')
         self._type = action_type() if action is None else action
         self._client = client(self, self._type, self.settings.action)
         self._goal: Any = None

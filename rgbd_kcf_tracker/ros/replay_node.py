@@ -31,6 +31,7 @@ from rgbd_kcf_tracker.live.stopping import Stopping
 from rgbd_kcf_tracker.parameters import describe
 from rgbd_kcf_tracker.recordings.outputs import check_outputs, write_file
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns, stamp_to_ns
+from rgbd_kcf_tracker.ros.names import full_name
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
 SETTLE_S = 0.3
@@ -42,12 +43,15 @@ class ReplayNode(Node):
     """Publishes a recording; all that it is told is read when it starts.
 
     Raises:
-        ParameterError: for a parameter that is unknown, of the wrong type or out of range.
+        ParameterError: for a parameter that is unknown, of the wrong type or out of range, or a name
+            that is none.
     """
 
     def __init__(self) -> None:
         super().__init__('replay', **DECLARE_OVERRIDES)
         self.parameters = self._read_parameters()
+        if self.parameters.answer_topic:
+            full_name(self, 'answer_topic', self.parameters.answer_topic, '/tracker/box')
         self._publishers_by_topic: dict[str, Any] = {}
         self._clock_publisher: Any = None
         self._answers: Answers | None = None

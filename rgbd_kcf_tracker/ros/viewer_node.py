@@ -40,6 +40,7 @@ from rgbd_kcf_tracker.recordings.images import (
 from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES
+from rgbd_kcf_tracker.ros.names import tracker_topics
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 from rgbd_kcf_tracker.ros.subscriptions import CAMERA_INFO, COLOR, DEPTH
 from rgbd_kcf_tracker.variants import default_parameters
@@ -82,7 +83,7 @@ class ViewerNode(Node):
         infos = {info.name: info for info in describe(ViewerParameters)}
         declare_all(self, infos, lambda _: True)
         self.settings = ViewerParameters(**{name: self.get_parameter(name).value for name in infos})
-        tracker = self.settings.tracker.rstrip('/')
+        tracker = tracker_topics(self, self.settings.tracker)
         # Its full name, as diagnostics and messages to people have it.
         self._tracker = self.resolve_topic_name(f'{tracker}/state').removesuffix('/state')
         self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
