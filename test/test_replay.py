@@ -255,6 +255,7 @@ def test_trackers_of_another_name_are_pointed_out(
         ({'bag': 'BAG', 'topics': '/nothing'}, 'has no topic /nothing'),
         ({'bag': 'BAG', 'topics': ['/color/image', '/nothing']}, 'has no topic /nothing.'),
         ({'bag': 'BAG', 'color_topic': '/nope'}, 'another as the parameter color_topic:=TOPIC'),
+        ({'bag': 'BAG', 'color_topic': '/depth/image'}, '/depth/image cannot be both colour and'),
         ({'bag': 'BAG', 'info_topic': '/nope'}, 'give another as the parameter info_topic:=TOPIC'),
         ({'bag': 'BAG', 'start': 1e6, 'wait_for_subscribers': 1e3}, 'ends before start, 1e+06 s'),
     ],

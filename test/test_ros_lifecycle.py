@@ -223,6 +223,8 @@ def test_parameters_while_running(rig: Rig) -> None:
         assert not set_parameter(rig, 'queue_policy', 'newest').successful
         assert not set_parameter(rig, 'kcf.padding', 'wide').successful
         assert not set_parameter(rig, 'init_box', '1,2,3').successful
+        refused = set_parameter(rig, 'auto_init_far', 0.4)
+        assert 'auto_init_near is 0.5 and auto_init_far 0.4' in refused.reason
         # An integer is taken for a double, and it reaches the tracker.
         assert set_parameter(rig, 'kcf.padding', 2).successful
         assert node.get_parameter('kcf.padding').value == 2.0

@@ -81,6 +81,7 @@ def test_what_cannot_be_understood_is_refused(
         ('kcf.learning_rate:=7.5', 'learning_rate is 7.5: it must be between 0 and 1'),
         ('pair_tolerance:="soon"', 'pair_tolerance'),
         ('variant:=3', 'variant'),
+        ('auto_init_far:=0.3', 'auto_init_near is 0.5 and auto_init_far 0.3: nobody is between'),
         ('init_box:="1,2,3"', 'give x,y,width,height'),
         ('init_box:="nan,2,3,4"', 'box x is nan: it must be finite: give x,y,width,height'),
         (
@@ -94,6 +95,13 @@ def test_a_tracker_refuses_wrong_parameters(
 ) -> None:
     assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures('_process')
+def test_colour_and_depth_on_one_topic_are_refused(capfd: pytest.CaptureFixture[str]) -> None:
+    assert tracker_main.main(['--ros-args', '-r', 'color/image:=depth/image']) == 2
+    line = capfd.readouterr().err.splitlines()[-1]
+    assert 'color/image and depth/image are both /depth/image: remap each' in line
 
 
 @pytest.mark.usefixtures('_process')

@@ -150,6 +150,11 @@ def test_named_topics() -> None:
             choose('/a', '/d', '/i', **{option: '/nothing'})  # type: ignore[arg-type]
     with pytest.raises(RecordingError, match='holds no images'):
         choose('/a', '/d', color='/tf')
+    for depth in (None, '/d'):
+        with pytest.raises(
+            RecordingError, match=r'/d cannot be both .*--color-topic or as --depth'
+        ):
+            choose('/a', '/d', color='/d', depth=depth)
 
 
 def test_nothing_that_fits_lists_the_topics() -> None:

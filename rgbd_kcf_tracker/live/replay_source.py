@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
 from rgbd_kcf_tracker.recordings.storage import Topic
+from rgbd_kcf_tracker.recordings.topics import SameTopicError
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 
 if TYPE_CHECKING:
@@ -198,7 +199,8 @@ class _BagMessages:
             self._recording = BagRecording(path, options)
             return
         except RecordingError as error:
-            if camera_needed and options.depth_topic is not None:
+            named = options.depth_topic is not None or isinstance(error, SameTopicError)
+            if camera_needed and named:
                 raise
             problem = str(error)
         try:

@@ -188,6 +188,15 @@ class NodeParameters(Parameters):
         True, 'Configure and activate at once; false waits for a lifecycle manager.'
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        near, far = self.auto_init_near, self.auto_init_far
+        if near >= far:
+            raise ParameterError(
+                f'parameter auto_init_near is {near:g} and auto_init_far {far:g}: nobody is '
+                'between them: the first must be the smaller'
+            )
+
 
 READ_ONLY = frozenset(
     {

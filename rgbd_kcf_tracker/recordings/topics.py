@@ -84,6 +84,10 @@ class ImageTopic:
         return base_name(self.name)
 
 
+class SameTopicError(RecordingError):
+    """One topic would be both colour and depth."""
+
+
 @dataclass(frozen=True, slots=True)
 class ChosenTopics:
     """Names of the topics to read; ``depth`` None for colour alone, ``info`` None where none is."""
@@ -123,7 +127,8 @@ def choose_topics(
         info: name of the CameraInfo topic, None to find it.
 
     Raises:
-        RecordingError: where a named topic is not there, nothing fits, or more than one thing does.
+        RecordingError: where a named topic is not there, nothing fits, or more than one thing does,
+            or one topic would be both.
     """
     finder = _Finder(images, described, where)
     if depth == NO_DEPTH or (depth is None and finder.has_no_depth()):
@@ -133,6 +138,11 @@ def choose_topics(
         colors = [finder.named(color, 'color')] if color else finder.candidates('color')
         depths = [finder.named(depth, 'depth')] if depth else finder.candidates('depth')
         chosen_color, chosen_depth = finder.pair(colors, depths)
+        if chosen_color == chosen_depth:
+            raise SameTopicError(
+                f'{where}: {chosen_color} cannot be both colour and depth: give another as '
+                f'--color-topic or as --depth-topic. {finder.listing()}'
+            )
     return ChosenTopics(chosen_color, chosen_depth, finder.info(info, infos, chosen_color))
 
 

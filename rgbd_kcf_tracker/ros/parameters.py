@@ -97,6 +97,7 @@ class ParameterServer:
         self._changed = changed
         self._infos = {info.name: info for info in all_parameters()}
         declare_all(node, self._infos, READ_ONLY.__contains__)
+        self.node_parameters()  # each may be right alone, and not beside another
         node.add_pre_set_parameters_callback(self._before_set)
         node.add_on_set_parameters_callback(self._on_set)
         node.add_post_set_parameters_callback(self._after_set)
@@ -130,14 +131,18 @@ class ParameterServer:
         return taken
 
     def _on_set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
-        for given in parameters:
-            info = self._infos.get(given.name)
-            if info is None:
-                continue
-            try:
-                coerced(info, given.value)
-            except ParameterError as error:
-                return SetParametersResult(successful=False, reason=str(error))
+        own = self._values('', NodeParameters)
+        try:
+            for given in parameters:
+                info = self._infos.get(given.name)
+                if info is None:
+                    continue
+                value = coerced(info, given.value)
+                if given.name in own:
+                    own[given.name] = value
+            NodeParameters(**own)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _after_set(self, parameters: Sequence[Parameter]) -> None:

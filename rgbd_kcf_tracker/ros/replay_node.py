@@ -43,8 +43,8 @@ class ReplayNode(Node):
     """Publishes a recording; all that it is told is read when it starts.
 
     Raises:
-        ParameterError: for a parameter that is unknown, of the wrong type or out of range, or a name
-            that is none.
+        ParameterError: for a parameter that is unknown, of the wrong type or out of range, or a
+            name that is none.
     """
 
     def __init__(self) -> None:

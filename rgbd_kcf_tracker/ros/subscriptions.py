@@ -16,6 +16,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image, RegionOfInterest
 from std_msgs.msg import UInt32
 
+from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
 from rgbd_kcf_tracker.ros.unheard import unheard
 
@@ -36,6 +37,9 @@ class Subscriptions:
         node: whose they are.
         settings: transports and QoS.
         color, depth, camera_info, init, init_point, add, remove: called with each message.
+
+    Raises:
+        ParameterError: where colour and depth would be one topic.
     """
 
     def __init__(
@@ -54,18 +58,20 @@ class Subscriptions:
         self._node, self._settings = node, settings
         overriding = QoSOverridingOptions.with_default_policies()
         self._all: dict[str, Any] = {}
-        for topic, transport, callback in (
-            (COLOR, settings.color_transport, color),
-            (DEPTH, settings.depth_transport, depth),
-        ):
-            kind: Any = Image
-            name = topic
-            if transport != RAW:
-                kind = CompressedImage
-                name = f'{node.resolve_topic_name(topic)}/{transport}'
+        transports = {COLOR: settings.color_transport, DEPTH: settings.depth_transport}
+        names = {
+            topic: topic if transport == RAW else f'{node.resolve_topic_name(topic)}/{transport}'
+            for topic, transport in transports.items()
+        }
+        one, other = map(node.resolve_topic_name, names.values())
+        if one == other:
+            raise ParameterError(
+                f'{COLOR} and {DEPTH} are both {one}: remap each to a topic of its own'
+            )
+        for topic, callback in ((COLOR, color), (DEPTH, depth)):
             self._all[topic] = node.create_subscription(
-                kind,
-                name,
+                Image if transports[topic] == RAW else CompressedImage,
+                names[topic],
                 callback,
                 image_qos(settings),
                 event_callbacks=NO_EVENTS,
