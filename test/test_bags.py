@@ -40,6 +40,7 @@ from bag_rig import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer as PlainMcapWriter
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -428,6 +429,27 @@ def test_what_is_not_there_or_holds_nothing(tmp_path: Path) -> None:
 def test_an_empty_bag_lists_what_it_has(kind: str, tmp_path: Path) -> None:
     path = WRITERS[kind](tmp_path, [])
     with pytest.raises(RecordingError, match=r'no colour topic.*no topics at all'):
+        read(path)
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3'])
+def test_topics_that_are_not_in_cdr_are_listed_as_left_out(kind: str, tmp_path: Path) -> None:
+    if kind == 'mcap':
+        path = tmp_path / 'web.mcap'
+        with path.open('wb') as file:
+            writer = PlainMcapWriter(file)
+            writer.start(profile='ros2')
+            schema = writer.register_schema('sensor_msgs/msg/Image', 'jsonschema', b'{}')
+            channel = writer.register_channel(COLOR, 'json', schema)
+            writer.add_message(channel, START_NS, b'{}', START_NS)
+            writer.finish()
+    else:
+        path = WRITERS['folder sqlite3'](tmp_path, camera_messages(make_frames(1)))
+        (database,) = path.glob('*.db3')
+        with closing(sqlite3.connect(database)) as opened:
+            opened.execute("UPDATE topics SET serialization_format = 'json'")
+            opened.commit()
+    with pytest.raises(RecordingError, match=rf"{COLOR} \(in 'json', not in cdr: left out\)"):
         read(path)
 
 

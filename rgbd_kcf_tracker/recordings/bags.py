@@ -128,7 +128,8 @@ class BagRecording(Closing):
         return choose_topics(
             self._images,
             [t.name for t in topics if t.type == INFO and len(t)],
-            {t.name: f'{t.type}, {len(t)} messages' for t in topics},
+            {name: f'in {form!r}, not in cdr: left out' for name, form in self.bag.left_out.items()}
+            | {t.name: f'{t.type}, {len(t)} messages' for t in topics},
             str(self.path),
             options.color_topic,
             options.depth_topic,

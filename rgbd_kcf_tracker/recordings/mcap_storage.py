@@ -71,6 +71,7 @@ class McapStorage:
         self.path = path
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
+        self.left_out: dict[str, str] = {}
         self.warnings: list[str] = []
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
@@ -212,6 +213,7 @@ class McapStorage:
             self.warnings.append(f'{self.path}: a damaged description of a topic is left out')
             return
         if channel.message_encoding != 'cdr':
+            self.left_out[channel.topic] = channel.message_encoding
             self.warnings.append(
                 f'{self.path}: topic {channel.topic} is in {channel.message_encoding!r}, '
                 'not in cdr, and is left out'

@@ -38,6 +38,7 @@ class RawBag:
         topics: by name, in the order of names.
         definitions: texts of message types, as far as the bag holds them.
         ros1: the messages are in ROS 1 serialisation.
+        left_out: name to serialisation of topics that are not read.
         warnings: what was odd.
 
     Raises:
@@ -46,6 +47,7 @@ class RawBag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.left_out: dict[str, str] = {}
         self.warnings: list[str] = []
         self.definitions: dict[str, Definition] = {}
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
@@ -136,6 +138,7 @@ class RawBag:
             for name, kind in storage.topics.items():
                 topics.setdefault(name, Topic(name, kind))
             self.definitions.update(storage.definitions)
+            self.left_out |= storage.left_out
             self.warnings += storage.warnings
         for topic in topics.values():
             topic.sort()

@@ -49,6 +49,7 @@ class Ros1Storage:
         self.path = path
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
+        self.left_out: dict[str, str] = {}
         self.warnings: list[str] = []
         self._connections: dict[int, tuple[str, str]] = {}
         # Place of a packed chunk's data: method, their length, unpacked length.

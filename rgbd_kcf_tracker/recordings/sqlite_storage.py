@@ -39,6 +39,7 @@ class SqliteStorage:
         self.path = path
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
+        self.left_out: dict[str, str] = {}
         self.warnings: list[str] = []
         self._copy: tempfile.TemporaryDirectory[str] | None = None
         with open_file(path) as file:
@@ -101,6 +102,7 @@ class SqliteStorage:
                 if not (isinstance(name, str) and isinstance(kind, str)):
                     continue
                 if form != 'cdr':
+                    self.left_out[name] = str(form)
                     self.warnings.append(f'{self.path}: topic {name} is in {form!r}: left out')
                     continue
                 names[number] = (name, kind)

@@ -61,6 +61,7 @@ class Storage(Protocol):
         ros1: messages are in ROS 1 serialisation, not CDR.
         topics: name to type of all topics, also those without messages; filled by :meth:`scan`.
         definitions: by type, as far as the file holds them; filled by :meth:`scan`.
+        left_out: name to serialisation of topics that are not read; filled by :meth:`scan`.
         warnings: what was odd; filled by :meth:`scan`.
     """
 
@@ -68,6 +69,7 @@ class Storage(Protocol):
     ros1: bool
     topics: dict[str, str]
     definitions: dict[str, Definition]
+    left_out: dict[str, str]
     warnings: list[str]
 
     def scan(self) -> Iterator[Scanned]:
