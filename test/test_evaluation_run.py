@@ -27,12 +27,14 @@ from rgbd_kcf_tracker.evaluation.jobs import (
     meta_path,
     thumbnails_path,
     tracks_path,
+    truth_path,
 )
 from rgbd_kcf_tracker.evaluation.metrics import vot
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts, read_thumbnails
+from rgbd_kcf_tracker.evaluation.perframe import collect
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, write_tracks
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
-from rgbd_kcf_tracker.evaluation.times import read_times
+from rgbd_kcf_tracker.evaluation.times import read_times, times_path, times_table
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -186,6 +188,36 @@ def test_a_run_that_was_cut_off_is_made_again(tmp_path: Path):
     runner.run([sequence('a')], [KCF], tmp_path, RunOptions())
     meta_path(tracks_path(tmp_path, 'kcf', 'a')).write_text('{"key": ')
     assert not is_done(tmp_path, sequence('a'), KCF, RunOptions())
+
+
+def test_what_a_run_left_and_is_damaged_is_named_with_what_mends_it(tmp_path: Path):
+    moving, options = sequence('moving'), RunOptions()
+    runner.run([moving], [KCF], tmp_path, options)
+    truth, tracks = truth_path(tmp_path, 'moving'), tracks_path(tmp_path, 'kcf', 'moving')
+    times = times_path(tmp_path, 'kcf', 'moving')
+
+    def read() -> None:
+        collect(tmp_path, [moving], [KCF], options)
+        times_table(tmp_path, [('kcf', 'moving')])
+
+    def error(path: Path, data: bytes) -> str:
+        before = path.read_bytes()
+        path.write_bytes(data)
+        with pytest.raises(DatasetError) as raised:
+            read()
+        path.write_bytes(before)
+        assert str(raised.value).startswith(f'{path}'), raised.value
+        assert str(raised.value).endswith(': delete the file and run again')
+        return str(raised.value)
+
+    for path in (truth, tracks):
+        lines = path.read_bytes().splitlines(keepends=True)
+        assert 'was cut off' in error(path, b''.join(lines[:5]))
+        assert 'a cell is no number' in error(path, b''.join(lines[:5]) + b'4,x,x,x')
+    lines = truth.read_bytes().splitlines(keepends=True)
+    error(truth, b''.join(lines[:-1]) + b'7')
+    assert 'is no JSON' in error(times, b'{"milli')
+    assert len(collect(tmp_path, [moving], [KCF], options).results) == 1
 
 
 def test_a_failing_sequence_does_not_end_the_run(tmp_path: Path):

@@ -28,7 +28,7 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
 from rgbd_kcf_tracker.evaluation.passes import Pass
-from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
+from rgbd_kcf_tracker.evaluation.store import left_by_a_run, read_json, slug, write_json
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.recordings.mot import Sightings, mot_text, read_mot
@@ -269,11 +269,12 @@ def read(folder: Path, sequence: Sequence, tracker: str) -> EveryoneResult:
         RgbdKcfError: where a file is not as it was written.
     """
     places = Places(folder, sequence.name)
-    meta = read_json(places.meta(tracker))
-    truth, tracks = read_mot(places.truth, regions=True), read_mot(places.tracks(tracker))
     bodies = None
-    if meta['bodies']:
-        whole = read_mot(places.bodies, regions=True)
+    with left_by_a_run():
+        meta = read_json(places.meta(tracker))
+        truth, tracks = read_mot(places.truth, regions=True), read_mot(places.tracks(tracker))
+        whole = read_mot(places.bodies, regions=True) if meta['bodies'] else None
+    if whole is not None:
         bodies = np.full(truth.boxes.shape, np.nan)
         row = {key: i for i, key in enumerate(zip(truth.frames, truth.ids, strict=True))}
         for key, box in zip(zip(whole.frames, whole.ids, strict=True), whole.boxes, strict=True):

@@ -28,6 +28,7 @@ from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, m
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place
 from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
 from rgbd_kcf_tracker.evaluation.store import (
+    left_by_a_run,
     read_json,
     read_tracks,
     read_truth,
@@ -135,12 +136,20 @@ def collect(
 def _collect_one(
     collected: Collected, folder: Path, sequence: Sequence, contender: Contender, path: Path
 ) -> None:
-    meta = read_json(meta_path(path))
-    if not meta['annotated']:
-        if sequence.name not in collected.unmeasured:
-            collected.unmeasured.append(sequence.name)
-        return
-    truth, tracks = read_truth(truth_path(folder, sequence.name)), read_tracks(path)
+    with left_by_a_run():
+        meta = read_json(meta_path(path))
+        if not meta['annotated']:
+            if sequence.name not in collected.unmeasured:
+                collected.unmeasured.append(sequence.name)
+            return
+        place = truth_path(folder, sequence.name)
+        truth, tracks = read_truth(place), read_tracks(path)
+        if len(truth.visible) != len(tracks.boxes):
+            cut = place if len(truth.visible) < len(tracks.boxes) else path
+            raise DatasetError(
+                f'{cut} was cut off: {place} has {len(truth.visible)} frames, {path} '
+                f'{len(tracks.boxes)}'
+            )
     size = int(meta['image_size'][0]), int(meta['image_size'][1])
     own = dict(sequence.categories)
     collected.infos[sequence.name] = Info(

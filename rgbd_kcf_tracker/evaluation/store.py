@@ -14,7 +14,8 @@ import io
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
-from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.recordings.results import HEADER
@@ -34,6 +35,10 @@ TRUTH_HEADER = (
     'frame', 'stamp_ns', 'x', 'y', 'width', 'height',
     'body_x', 'body_y', 'body_width', 'body_height', 'visible_fraction', 'judged',
 )  # fmt: skip
+
+
+MENDED_BY = 'delete the file and run again'
+"""What mends a damaged file of a run: what is not there is made anew."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +69,19 @@ class Truth:
     judged: Mask
 
 
+@contextmanager
+def left_by_a_run() -> Iterator[None]:
+    """Errors of reading inside are of files that a run left, and say what to do with them.
+
+    Raises:
+        DatasetError: for each.
+    """
+    try:
+        yield
+    except RgbdKcfError as error:
+        raise DatasetError(f'{error}: {MENDED_BY}') from None
+
+
 def slug(name: str) -> str:
     """A name as a file's: other characters than letters, digits, dots and dashes replaced."""
     return re.sub(r'[^A-Za-z0-9.=-]+', '_', name).strip('._') or '_'
@@ -82,8 +100,10 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         value = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError) as error:
-        raise DatasetError(f'{path} cannot be read: {error}') from None
+    except OSError as error:
+        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+    except (RecursionError, ValueError):
+        raise DatasetError(f'{path} is no JSON') from None
     if not isinstance(value, dict):
         raise DatasetError(f'{path} holds no JSON object')
     return value
@@ -148,8 +168,8 @@ def read_truth(path: Path) -> Truth:
             [[_number(row[k]) for k in TRUTH_HEADER[2:]] for row in rows], np.float64
         ).reshape(len(rows), len(TRUTH_HEADER) - 2)
         stamps = tuple(int(row['stamp_ns']) for row in rows)
-    except ValueError:
-        raise DatasetError(f'{path}: a cell is no number: delete the file and run again') from None
+    except (TypeError, ValueError):  # TypeError: the row ends before its stamp
+        raise DatasetError(f'{path}: a cell is no number') from None
     body = table[:, 4:8]
     whole = None if np.isnan(body).all() else body
     return Truth(stamps, table[:, :4], whole, table[:, 8], table[:, 9] != 0)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
+from rgbd_kcf_tracker.evaluation.store import left_by_a_run, read_json, slug, write_json
 from rgbd_kcf_tracker.evaluation.table import Table
 
 FILE = 'times.csv'
@@ -53,7 +53,8 @@ def times_table(folder: Path, runs: Iterable[tuple[str, str]]) -> Table:
         path = times_path(folder, tracker, sequence)
         if not path.is_file():
             continue
-        kept = read_json(path)
+        with left_by_a_run():
+            kept = read_json(path)
         key = tracker, str(kept.get('processor', ''))
         found.setdefault(key, []).append(read_times(folder, tracker, sequence)[1:])
     rows = []
