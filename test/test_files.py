@@ -273,9 +273,18 @@ def test_camera_info_beside_a_sequence_is_read(
     camera = next(iter(sequence.open().samples)).frame.intrinsics
     assert camera is not None
     assert camera.fx == 70
-    for text in ('', '[]', '{}', '{"K": 5}', '{"K": [0, 0]}', '[' * 100_000):
+    for text, words in (
+        ('', 'line 1 is no JSON'),
+        ('[]', 'it is no JSON object'),
+        ('{}', 'K is missing'),
+        ('{"K": 5}', 'camera_info has no 3x3 K'),
+        ('{"K": [0, 0]}', 'camera_info has no 3x3 K'),
+        (f'{{"K": [1{"0" * 400}, 0, 31, 0, 71, 22, 0, 0, 1]}}', 'camera_info has no 3x3 K'),
+        ('{"K": [70, 0, 31, 0, 71, 22, 0, 0, 1], "roi": 5}', 'roi is no JSON object'),
+        ('[' * 100_000, 'it is nested too deeply'),
+    ):
         info.write_text(text)
-        assert 'camera_info.json holds no camera' in refused(capsys, 'info', source)
+        assert f'camera_info.json holds no camera ({words}' in refused(capsys, 'info', source)
     # our own file goes before it
     (source / 'intrinsics.json').write_text('{"fx": 60, "fy": 61, "cx": 31.5, "cy": 23.5}')
     with open_recording(source) as recording:

@@ -189,10 +189,12 @@ def test_no_images(tmp_path: Path) -> None:
         ('groundtruth.txt', '1,2,3,4\n1,2,3\n', 'groundtruth.txt, line 2.*is no box'),
         ('groundtruth.txt', 'a,b,c,d\n', 'line 1'),
         ('groundtruth.txt', '\xff\xfe', 'not a text file'),
-        ('intrinsics.json', '{"fx": 1}', 'holds no intrinsics'),
-        ('intrinsics.json', '[1, 2]', 'holds no intrinsics'),
+        ('intrinsics.json', '{"fx": 1}', r'holds no intrinsics \(fy is missing\): write'),
+        ('intrinsics.json', '[1, 2]', r'holds no intrinsics \(it is no JSON object\): write'),
+        ('intrinsics.json', f'{{"fx": 1{"0" * 400}}}', "fx is '1000.*', no number of pixels"),
+        ('intrinsics.json', f'{{"fx": 1{"0" * 5000}}}', 'a number has thousands of digits'),
         ('intrinsics.json', '{"fx": -5, "fy": 1, "cx": 1, "cy": 1}', 'focal lengths'),
-        ('intrinsics.json', 'nothing', 'holds no intrinsics'),
+        ('intrinsics.json', 'nothing', r'holds no intrinsics \(line 1 is no JSON\): write'),
     ],
 )
 def test_bad_text_files_are_named(name: str, text: str, words: str, tmp_path: Path) -> None:

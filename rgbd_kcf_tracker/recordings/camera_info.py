@@ -124,7 +124,7 @@ def _numbers(msg: Any, name: str, count: int) -> Sequence[float]:
     values: Any = _field(msg, name, ())
     try:
         numbers = [float(v) for v in values]
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         numbers = []
     if len(numbers) != count:
         raise ImageError('camera_info has no 3x3 K and 3x4 P: leave it out or calibrate')
@@ -171,7 +171,7 @@ def _lens(msg: Any) -> Lens | None:
     model = str(getattr(msg, 'distortion_model', '') or '')
     try:
         values = tuple(float(v) for v in given)
-    except (TypeError, ValueError):
+    except (OverflowError, TypeError, ValueError):
         raise ImageError('camera_info has a D that is no list of numbers') from None
     if not any(values):
         return None

@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
@@ -137,16 +138,43 @@ def read_intrinsics(path: Path) -> Intrinsics:
     Raises:
         RecordingError: where one is missing or no number.
     """
+    text = read_text(path)
     try:
-        values = json.loads(read_text(path))
-        return Intrinsics(*(float(values[key]) for key in ('fx', 'fy', 'cx', 'cy')))
-    except RecordingError:
-        raise
-    except (RecursionError, ValueError, TypeError, KeyError, RgbdKcfError) as error:
+        values = _json_object(text)
+        return Intrinsics(*(_json_number(values, key) for key in ('fx', 'fy', 'cx', 'cy')))
+    except RgbdKcfError as error:
         raise RecordingError(
             f'{path} holds no intrinsics ({error}): '
             'write {"fx": .., "fy": .., "cx": .., "cy": ..}'
         ) from None
+
+
+def _json_object(text: str) -> dict[str, Any]:
+    """A JSON object; what is wrong with one is said in our words, as Python's are about Python.
+
+    Raises:
+        RecordingError: where the text is none.
+    """
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise RecordingError(f'line {error.lineno} is no JSON') from None
+    except RecursionError:
+        raise RecordingError('it is nested too deeply') from None
+    except ValueError:
+        raise RecordingError('a number has thousands of digits') from None
+    if not isinstance(value, dict):
+        raise RecordingError('it is no JSON object')
+    return value
+
+
+def _json_number(values: Mapping[str, Any], key: str) -> float:
+    if key not in values:
+        raise RecordingError(f'{key} is missing')
+    try:
+        return float(values[key])
+    except (OverflowError, TypeError, ValueError):
+        raise RecordingError(f'{key} is {str(values[key])[:20]!r}, no number of pixels') from None
 
 
 def folder_intrinsics(folder: Path) -> Intrinsics | None:
@@ -164,15 +192,18 @@ def folder_intrinsics(folder: Path) -> Intrinsics | None:
     path = folder / CAMERA_INFO
     if not path.exists():
         return None
+    text = read_text(path)
     try:
-        fields = {str(name).lower(): value for name, value in json.loads(read_text(path)).items()}
-        roi = SimpleNamespace(**(fields.pop('roi', None) or {}))
+        fields = {name.lower(): value for name, value in _json_object(text).items()}
+        roi = fields.pop('roi', None) or {}
         rectified = YES if fields.pop('rectified', False) else NO
-        told = SimpleNamespace(**({'p': [0.0] * 12} | fields | {'k': fields['k'], 'roi': roi}))
+        if 'k' not in fields:
+            raise RecordingError('K is missing')
+        if not isinstance(roi, dict):
+            raise RecordingError('roi is no JSON object')
+        told = SimpleNamespace(**({'p': [0.0] * 12} | fields | {'roi': SimpleNamespace(**roi)}))
         found = camera_from_info(told, rectified=rectified)
-    except RecordingError:
-        raise
-    except (RecursionError, ValueError, TypeError, KeyError, AttributeError, RgbdKcfError) as error:
+    except RgbdKcfError as error:
         raise RecordingError(
             f'{path} holds no camera ({error}): write the fields of CameraInfo, or {INTRINSICS}'
         ) from None
