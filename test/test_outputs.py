@@ -294,6 +294,11 @@ def test_outputs_that_cannot_be_are_refused_before_anything_is_read(
     assert f'there is no folder {tmp_path / "nodir"}: make it first' in error
     assert 'is a named pipe' in refused(capsys, *track, '--output', tmp_path / 'pipe')
     assert 'is a device' in refused(capsys, *track, '--output', '/dev/null')
+    assert 'as --output -: give the name' in refused(capsys, *track, '--output', '/dev/stdout')
+    for kind in ('mot', 'video', 'bag'):
+        for more in ((), ('--jobs', 1, '--output', tmp_path / 'new')):
+            error = refused(capsys, *track, f'--{kind}', '-', *more)
+            assert f'--{kind} - would be standard output' in error
     assert 'lead in a circle' in refused(capsys, *track, '--output', tmp_path / 'loop')
     assert 'lead in a circle' in refused(capsys, *track, '--bag', tmp_path / 'loop' / 'a.mcap')
     assert 'must end in .mp4' in refused(capsys, *track, '--video', tmp_path / 'b.xyz')

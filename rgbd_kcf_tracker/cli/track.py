@@ -348,7 +348,9 @@ def _check_outputs(args: argparse.Namespace) -> None:
             'by --table parquet --output FOLDER'
         )
     outputs = {f'--{name}': getattr(args, name) for name in ('output', 'mot', 'video', 'bag')}
-    written = {option: path for option, path in outputs.items() if path and path != '-'}
+    if outputs['--output'] == '-':
+        del outputs['--output']
+    written = {option: path for option, path in outputs.items() if path}
     check_outputs(written, [args.source], args.overwrite)
     if args.video:
         require_video(args.video)

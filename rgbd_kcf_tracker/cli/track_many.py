@@ -220,9 +220,14 @@ def _names(sources: Sequence[str]) -> list[str]:
 
 
 def _folders(args: argparse.Namespace) -> dict[str, Path]:
+    from rgbd_kcf_tracker.recordings.outputs import refuse_standard_output
+
     if args.output is None or args.output == '-':
         raise ParameterError('several recordings: give the folder for their files as --output DIR')
     given = {kind: getattr(args, kind) for kind in KINDS}
+    for kind, path in given.items():
+        if path:
+            refuse_standard_output(f'--{kind}', path)
     return {kind: Path(os.path.abspath(path)) for kind, path in given.items() if path}
 
 

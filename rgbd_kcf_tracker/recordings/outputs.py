@@ -41,6 +41,7 @@ Identity = tuple[int, int]
 _PART, _TOKEN = '.part-', 8
 _DEAD_S = 3600.0
 """Seconds after which a part that nobody writes to is of a process that died."""
+_STANDARD_OUTPUT = ('/dev/stdout', '/dev/fd/1', '/proc/self/fd/1')
 _BESIDE = ('-wal', '-shm', '-journal')
 """What SQLite keeps beside a database, by the end of its name."""
 
@@ -62,10 +63,12 @@ def check_outputs(
 
     Raises:
         RecordingError: for an output that is a source or lies in one, is there already, is no
-            regular file, lies in a folder that does not exist, or is another output, too.
+            regular file, is standard output, lies in a folder that does not exist, or is another
+            output, too.
     """
     places: dict[str, tuple[Path, Path, os.stat_result | None]] = {}
     for option, given in outputs.items():
+        refuse_standard_output(option, given)
         target = _target(Path(given))
         _check_place(Path(given), target)
         places[option] = Path(given), target, _stat(target)
@@ -96,6 +99,21 @@ def check_outputs(
         if key in seen:
             raise RecordingError(f'{name} is {seen[key]}, too: give each its own file')
         seen[key] = name
+
+
+def refuse_standard_output(option: str, given: str | os.PathLike[str]) -> None:
+    """Refuse what stands for standard output where a file of its own is written.
+
+    Raises:
+        RecordingError: where it does.
+    """
+    name = os.fspath(given)
+    if name == '-' or name in _STANDARD_OUTPUT:
+        here = ' (./- where it is called so)' if name == '-' else ''
+        raise RecordingError(
+            f'{option} {name} would be standard output, which takes the rows of track alone, as '
+            f'--output -: give the name of a file{here}'
+        )
 
 
 def make_folder(path: Path) -> None:
