@@ -395,6 +395,12 @@ def test_a_port_that_is_taken_is_said(server: Server, stub: Stub) -> None:
         Server(stub, port=99999).start()
 
 
+@pytest.mark.parametrize('host', ['nope.invalid', 'a' * 80])
+def test_a_host_that_is_none_is_said(stub: Stub, host: str) -> None:
+    with pytest.raises(ParameterError, match=f"'{host}' is no name .* --host"):
+        Server(stub, host=host, token='long enough').start()
+
+
 @pytest.mark.parametrize('width', [2**32 - 50, 4294967246.0])
 def test_a_number_is_taken_however_it_is_written(width: float) -> None:
     box = {'do': 'box', 'x': 1, 'y': 2, 'width': width, 'height': 3, 'frame': 0}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import errno
 import hmac
 import ipaddress
 import logging
@@ -390,10 +391,15 @@ def _bound(host: str, port: int) -> socket.socket:
         listening = socket.socket(family, socket.SOCK_STREAM)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind((host, port))
+    except (UnicodeError, socket.gaierror):
+        raise ParameterError(
+            f'{host!r} is no name or address of this machine: give another as --host'
+        ) from None
     except (OSError, OverflowError) as error:
         reason = getattr(error, 'strerror', None) or error
+        wrong = 'host' if getattr(error, 'errno', None) == errno.EADDRNOTAVAIL else 'port'
         raise ParameterError(
-            f'{host}:{port} cannot be listened on: {reason}; name another --port'
+            f'{host}:{port} cannot be listened on: {reason}; name another --{wrong}'
         ) from None
     return listening
 
