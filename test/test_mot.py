@@ -49,7 +49,7 @@ def test_ground_truth_of_mot16_and_later_has_class_and_visible_share(tmp_path: P
         ('1,2,nan,4,5,6,1,-1,-1,-1', 'line 2: .* not finite'),
         ('0,2,3,4,5,6,1,-1,-1,-1', 'line 2: frame 0: write whole numbers from 1'),
         ('1.5,2,3,4,5,6,1,-1,-1,-1', 'line 2: frame 1.5'),
-        ('1e300,2,3,4,5,6,1,-1,-1,-1', 'line 2: frame 1e300'),
+        ('1e300,2,3,4,5,6,1,-1,-1,-1', 'line 2: frame 1e300: write whole numbers from 1 to 9007'),
         ('1,2.5,3,4,5,6,1,-1,-1,-1', 'line 2: id 2.5'),
         ('1,-1,3,4,5,6,1,-1,-1,-1', 'line 2: id -1: these are detections'),
         ('1,2,3,4,0,6,1,-1,-1,-1', 'line 2: a box of 0 x 6 pixels'),

@@ -41,6 +41,9 @@ REGION_ID = -1
 PEDESTRIAN = 1
 """MOT Challenge's class of people on foot; all others are not counted."""
 
+LARGEST = 2**53 - 1
+"""Number of a frame or a person: beyond, not every whole number is a double."""
+
 BARELY_VISIBLE = 0.4
 """In ground truth, a person of whom less shows is neither hit nor miss: their score is 0."""
 
@@ -160,10 +163,10 @@ def _parse(place: str, line: str) -> tuple[float, ...]:
     if not all(map(math.isfinite, values)):
         raise RecordingError(f'{place}: {shown}: a number is not finite; leave absent people out')
     frame, who, x, y, width, height, score = values[:7]
-    if not (frame.is_integer() and 1 <= frame < 2**53):
-        raise RecordingError(f'{place}: frame {cells[0]}: write whole numbers from 1')
-    if not (who.is_integer() and REGION_ID <= who < 2**53):
-        raise RecordingError(f'{place}: id {cells[1]}: write whole numbers from 0')
+    if not (frame.is_integer() and 1 <= frame <= LARGEST):
+        raise RecordingError(f'{place}: frame {cells[0]}: write whole numbers from 1 to {LARGEST}')
+    if not (who.is_integer() and REGION_ID <= who <= LARGEST):
+        raise RecordingError(f'{place}: id {cells[1]}: write whole numbers from 0 to {LARGEST}')
     if width <= 0 or height <= 0:
         raise RecordingError(f'{place}: a box of {width:g} x {height:g} pixels has no size')
     share = math.nan
