@@ -103,6 +103,15 @@ def test_colour_alone(tmp_path: Path) -> None:
         assert recording.info().frames_with_depth == 0
 
 
+def test_a_depth_that_is_no_folder_is_told(tmp_path: Path) -> None:
+    folder(tmp_path, depth=False)
+    (tmp_path / 'depth').write_text('')
+    with open_recording(tmp_path) as recording:
+        assert recording.warnings == [
+            f'{tmp_path / "depth"} is no folder of images: read as colour alone'
+        ]
+
+
 def test_stamps_from_the_rate_from_a_file_and_given_intrinsics(tmp_path: Path) -> None:
     folder(tmp_path)
     with open_recording(tmp_path, ReadOptions(fps=5, intrinsics=CAMERA)) as recording:

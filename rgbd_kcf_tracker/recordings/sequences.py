@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -139,7 +140,11 @@ class SequenceFolder(Closing):
         self, colors: tuple[Path, ...], options: ReadOptions
     ) -> tuple[Path | None, ...]:
         folder = self.path / DEPTH_FOLDER
-        if not folder.is_dir() or options.depth_topic == NO_DEPTH:
+        if options.depth_topic == NO_DEPTH:
+            return ()
+        if not folder.is_dir():
+            if os.path.lexists(folder):
+                self.warnings.append(f'{folder} is no folder of images: read as colour alone')
             return ()
         depths = depths_beside(colors, folder)
         missing = sum(p is None for p in depths)
