@@ -415,6 +415,22 @@ def test_warnings_are_not_endless(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert capsys.readouterr().out.count('read without depth') == 27
 
 
+def test_control_characters_of_names_do_not_reach_the_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sent = [
+        dataclasses.replace(s, topic=f'{s.topic}\x1b[2J\n') for s in camera_messages(make_frames(2))
+    ]
+    source = write_mcap(tmp_path / 'a.mcap', sent)
+    assert main(['info', str(source)]) == 0
+    said = capsys.readouterr().out
+    assert f'{COLOR}\\x1b[2J\\n ' in said
+    assert '\x1b' not in said
+    error = fails(capsys, 'track', source, '--color-topic', '/none')
+    assert f'{COLOR}\\x1b[2J\\n ' in error
+    assert '\x1b' not in error
+
+
 def test_info_checks_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = write_folder(tmp_path / 'a')
     assert main(['info', str(source), '--check']) == 0

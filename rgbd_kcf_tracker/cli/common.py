@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from importlib.util import find_spec
@@ -288,9 +289,14 @@ def counter(total: int, unit: str) -> Iterator[Callable[[int, str], None]]:
         yield count
 
 
+def escaped(text: str) -> str:
+    r"""``text`` for a terminal: control characters, as names in a file may hold, as ``\x1b``."""
+    return re.sub(r'[\x00-\x1f\x7f-\x9f]', lambda found: repr(found.group())[1:-1], text)
+
+
 def warn(text: str) -> None:
     """A warning on standard error."""
-    print(f'warning: {text}', file=sys.stderr)
+    print(f'warning: {escaped(text)}', file=sys.stderr)
 
 
 class Warnings:

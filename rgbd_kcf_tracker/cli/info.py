@@ -11,7 +11,13 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from rgbd_kcf_tracker.cli.common import SOURCE_HELP, add_reading_options, progress, read_options
+from rgbd_kcf_tracker.cli.common import (
+    SOURCE_HELP,
+    add_reading_options,
+    escaped,
+    progress,
+    read_options,
+)
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
 if TYPE_CHECKING:
@@ -58,10 +64,10 @@ def _check(args: argparse.Namespace, options: ReadOptions) -> int:
                     pass
             except RgbdKcfError as error:
                 damaged += 1
-                print(f'damaged: {error}', file=out)
+                print(f'damaged: {escaped(str(error))}', file=out)
         spent = time.perf_counter() - begun
         for warning in recording.warnings[told:]:
-            print(f'warning: {warning}', file=out)
+            print(f'warning: {escaped(warning)}', file=out)
         rate = len(recording) / spent if spent else 0.0
         print(
             f'checked       {len(recording)} frames, {damaged} damaged, {rate:.0f} frames/s',
@@ -97,7 +103,7 @@ def _as_text(info: RecordingInfo) -> str:
     if info.problem:
         lines += ['', f'cannot be tracked as it is: {info.problem}']
     lines += [f'warning: {text}' for text in info.warnings]
-    return '\n'.join(lines)
+    return '\n'.join(map(escaped, lines))
 
 
 def _row(stream: StreamInfo) -> tuple[str, ...]:

@@ -69,7 +69,9 @@ def _run(arguments: list[str]) -> int:
             sys.stdout.flush()
             return code
     except RgbdKcfError as error:
-        print(f'{PROGRAM}: error: {error}', file=sys.stderr)
+        from rgbd_kcf_tracker.cli.common import escaped
+
+        print(f'{PROGRAM}: error: {escaped(str(error))}', file=sys.stderr)
         return EXIT_USAGE
     except ModuleNotFoundError as error:
         from rgbd_kcf_tracker.recordings import BAG_LIBRARIES, HOW_TO_GET_THEM
