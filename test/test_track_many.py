@@ -17,6 +17,7 @@ import pytest
 from rgbd_kcf_tracker.batch.workers import LocalPool
 from rgbd_kcf_tracker.cli import track, track_many
 from rgbd_kcf_tracker.cli.main import main
+from rgbd_kcf_tracker.cli.workers import record
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 from rgbd_kcf_tracker.recordings.rowfiles import join_csv
 
@@ -320,6 +321,8 @@ def test_names_that_are_no_utf8(recordings: Path, tmp_path: Path):
         (['normal_*', '--output', 'o', '--init', '1,2'], 'is no box'),
         (['normal_*', '--output', 'o', '--shard', '3/2'], '--shard 3/2'),
         (['normal_*', '--output', 'o', '--cluster', 'none.json'], 'none.json cannot be read'),
+        (['normal_*', '--output', 'o', '--jobs', '0', '--mot', 'o2'], '--jobs is 0'),
+        (['normal_0', '--output', 'o.csv', '--jobs', '4'], '--output o.csv would be a folder'),
     ],
 )
 def test_mistakes_are_told_before_any_work(
@@ -328,7 +331,22 @@ def test_mistakes_are_told_before_any_work(
     monkeypatch.chdir(recordings)
     assert main(['track', *words]) == 2
     assert message in capsys.readouterr().err
-    assert not list((recordings / 'o').rglob('*.csv'))
+    assert not list(recordings.glob('o*')), 'nor is an empty folder left'
+
+
+def test_a_record_that_a_full_disk_does_not_take_is_not_left_empty(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    real = Path.open
+
+    def full(path: Path, *given: Any, **more: Any) -> Any:
+        real(path, *given, **more).close()
+        return open('/dev/full', 'w', encoding='utf-8')
+
+    monkeypatch.setattr(Path, 'open', full)
+    with pytest.raises(RecordingError, match=r'runs\.jsonl cannot be written: No space'):
+        record(tmp_path, 'one process')
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_same_command_beside_itself_harms_neither(

@@ -6,15 +6,16 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import glob
 import hashlib
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
@@ -30,6 +31,9 @@ from rgbd_kcf_tracker.cli.workers import (
 )
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.extras import require
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.batch.shards import Shard
 
 EPILOG = """\
 several recordings:
@@ -101,8 +105,7 @@ def is_asked(args: argparse.Namespace) -> bool:
 def run(args: argparse.Namespace) -> int:
     """Follow targets through all recordings that are not done yet; returns the exit code."""
     require('batch', 'track of several recordings')
-    from rgbd_kcf_tracker.batch.loop import run_all
-    from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
+    from rgbd_kcf_tracker.recordings.outputs import check_outputs
 
     sources = _sources(args)
     folders = _folders(args)
@@ -118,8 +121,21 @@ def run(args: argparse.Namespace) -> int:
     read = [*sources, *([args.list] if args.list and args.list != '-' else [])]
     for kind, folder in folders.items():  # each alone: they may be one
         check_outputs({f'--{kind}': folder}, read, overwrite=True, folders=(f'--{kind}',))
-    for folder in folders.values():
-        make_folder(folder)
+    with _made(list(folders.values())):
+        return _run_in(args, folders, jobs, own, shard, read)
+
+
+def _run_in(
+    args: argparse.Namespace,
+    folders: dict[str, Path],
+    jobs: list[TrackJob],
+    own: list[TrackJob],
+    shard: Shard | None,
+    read: list[str],
+) -> int:
+    """Follow through recordings, into folders that are there; returns the exit code."""
+    from rgbd_kcf_tracker.batch.loop import run_all
+
     tables = [folders['output'] / name for name in (SOURCES, f'tracks.{args.table or TABLES[0]}')]
     _refuse_to_write(own, [*tables, folders['output'] / RECORD], read)
     needs = list(dict.fromkeys(Path(job.source).parent for job in own))
@@ -153,6 +169,27 @@ def run(args: argparse.Namespace) -> int:
         print(f'{name}: {row["error"]}', file=sys.stderr)
     print(f'{len(own) - len(rows)} of {len(own)} recordings are in {folders["output"]}')
     return EXIT_FAILURES if rows else 0
+
+
+@contextlib.contextmanager
+def _made(folders: Sequence[Path]) -> Iterator[None]:
+    """Make folders; those made here go where an error leaves nothing in them.
+
+    Raises:
+        RecordingError: where one cannot be made.
+    """
+    from rgbd_kcf_tracker.recordings.outputs import make_folder
+
+    new = [folder for folder in dict.fromkeys(folders) if not folder.exists()]
+    try:
+        for folder in folders:
+            make_folder(folder)
+        yield
+    except RgbdKcfError:
+        for folder in new:
+            with contextlib.suppress(OSError):  # it holds something, or was not made
+                folder.rmdir()
+        raise
 
 
 # --- what is asked for
@@ -228,7 +265,22 @@ def _folders(args: argparse.Namespace) -> dict[str, Path]:
     for kind, path in given.items():
         if path:
             refuse_standard_output(f'--{kind}', path)
+            _refuse_file_name(kind, path)
     return {kind: Path(os.path.abspath(path)) for kind, path in given.items() if path}
+
+
+def _refuse_file_name(kind: str, path: str) -> None:
+    """Refuse the name of a file for what would be a folder, unless it is one.
+
+    Raises:
+        ParameterError: for such a name.
+    """
+    if path.endswith(KINDS[kind]) and not os.path.isdir(path):
+        raise ParameterError(
+            f'--{kind} {path} would be a folder, as it is with several recordings, --list, '
+            f'--table, --jobs, --cluster or --shard: give a name without {KINDS[kind]}, or one '
+            'SOURCE and none of these'
+        )
 
 
 def _job(args: argparse.Namespace, source: str, name: str, folders: dict[str, Path]) -> TrackJob:

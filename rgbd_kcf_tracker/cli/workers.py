@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import platform
 import shlex
@@ -156,10 +157,12 @@ def record(folder: Path, workers: str, **more: object) -> None:
         'libraries': dict(own.libraries),
         **more,
     }
+    path = folder / RECORD
     try:
-        with (folder / RECORD).open('a', encoding='utf-8') as file:
+        with path.open('a', encoding='utf-8') as file:
             file.write(json.dumps(line) + '\n')
     except OSError as error:
-        raise RecordingError(
-            f'{folder / RECORD} cannot be written: {error.strerror or error}'
-        ) from None
+        with contextlib.suppress(OSError):
+            if not path.stat().st_size:  # the disk is full, and it was made just now
+                path.unlink()
+        raise RecordingError(f'{path} cannot be written: {error.strerror or error}') from None
