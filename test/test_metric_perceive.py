@@ -550,6 +550,32 @@ def test_who_steps_before_a_camera_and_changes_its_exposure_does_not_move_it(see
     assert not isinstance(ego.update(covered, view, NOBODY, 0.1), Pose)
 
 
+@pytest.mark.parametrize('seed', range(6))
+def test_a_shirt_with_more_corners_than_the_wall_is_not_the_camera(seed: int):
+    """Most corners were on somebody whom nothing told from the wall, and the room went with him."""
+    ego, wall = EgoMotion(), 128 + 0.4 * (texture(3).astype(float) - 128)
+    _, view = seen_by(STILL)
+    for frame in range(8):
+        image, left = wall.astype(np.uint8), 30 + 3 * frame
+        image[25:-25, left : left + 40] = texture(40 + seed)[50:, :40]
+        assert ego.update(image, view, NOBODY, 0.1) is None
+        ego.settle()
+
+
+def test_the_outlines_of_those_who_walk_are_no_corners_of_the_room():
+    ego, wall = EgoMotion(), 128 + 0.15 * (texture(3).astype(float) - 128)
+    _, view = seen_by(STILL)
+    others = NOBODY
+    stripes = np.where(np.arange(ROWS - 40) // 6 % 2, 70, 30)[:, None, None]
+    for frame in range(8):
+        image, now = wall.astype(np.uint8), NOBODY.copy()
+        for left in (30 + 4 * frame, 100 - 3 * frame, 150 + 5 * frame):
+            image[20:-20, left : left + 25], now[20:-20, left : left + 25] = stripes, True
+        assert ego.update(image, view, others, 0.1) is None
+        ego.settle()
+        others = now
+
+
 def test_a_cut_to_something_else_is_said_to_be_lost():
     ego = EgoMotion()
     image, view = seen_by(STILL)

@@ -39,10 +39,16 @@ CORNER_QUALITY, CORNER_DISTANCE = 0.01, 6
 CVPR 1994), and pixels of the view between two. A motion has six unknowns and each corner gives two
 equations, so ninety are plenty even where half are on somebody; the distance spreads them over the
 view, as one poster would not tell a turn from a step aside."""
+CELL = 24
+"""Pixels of a side of the squares of the view that speak with one voice, however many corners each
+has: about a tenth of its width, so that a checked shirt says no more than the wall around it."""
+BESIDE = 2
+"""Pixels beside what may move by itself within which no corner is taken: half the square about a
+corner that makes it one, and a pixel by which outlines are off."""
 LEAST_CORNERS = 12
 LEAST_AGREEING = 0.4
 """Corners that must agree on a motion for it to be believed, four times as many equations as it has
-unknowns, and their share of all: people may fill half of the view."""
+unknowns, and their share of the view: people may fill half of it."""
 AGREE = 1.5
 """Pixels of the view within which a corner agrees: flow is good to a part of one, and a corner's
 depth may be that of either side of an edge."""
@@ -53,8 +59,8 @@ FAR = 4.0
 """Pixels of the view by which corners move before a camera that turns fast: from standing still the
 fit of :data:`ITERATIONS` hardly finds that, as it begins with this scale."""
 STILL, LEAST_STILL = 0.3, 0.35
-"""Pixels of flow up to which a corner stands still, and the share of them from which the camera
-does: somebody may have stepped before the others."""
+"""Pixels of flow up to which a corner stands still, and their share of the view from which the
+camera does: somebody may have stepped before the others."""
 MANY, HARDLY = 36, 0.05
 """Corners from which, and the share of them that stands still below which, the camera has moved for
 good, also where depth agrees, as before a wall."""
@@ -68,7 +74,8 @@ STANDS = 3.0
 """Seconds for which that is asked in every frame once it has crept."""
 CREEPS, CREEPING = 0.7, 0.15
 """Pixels by which a corner has moved for good, thrice what flow is uncertain by, and the share of
-corners that must have, as the motion tells: what is far ahead of a robot hardly moves."""
+the view in which corners must have, as the motion tells: what is far ahead of a robot hardly moves.
+That corners agree is little where the motion is as small: those that stand still do, too."""
 LEAST_CREEPING = LEAST_CORNERS // 2
 """Corners of these at the least: as many equations as a motion has unknowns, twice."""
 
@@ -247,12 +254,14 @@ def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> b
 
 
 def _still(first: Points, second: Points) -> bool:
-    return _stood(first, second) >= max(LEAST_CORNERS, LEAST_STILL * len(first))
+    still = _stood(first, second)
+    return int(np.count_nonzero(still)) >= LEAST_CORNERS and _share(still, first) >= LEAST_STILL
 
 
-def _stood(first: Points, second: Points) -> int:
-    """How many corners are where they were."""
-    return int(np.count_nonzero(np.abs(second - first).max(axis=1) < STILL))
+def _stood(first: Points, second: Points) -> npt.NDArray[np.bool_]:
+    """Which corners are where they were, ``(n,)`` bool."""
+    stood: npt.NDArray[np.bool_] = np.abs(second - first).max(axis=1) < STILL
+    return stood
 
 
 def upper_median(values: GrayImage) -> int:
@@ -264,16 +273,17 @@ def upper_median(values: GrayImage) -> int:
 def _told(
     last: GrayImage, last_view: DepthView, gray: GrayImage, others: npt.NDArray[np.bool_]
 ) -> Pose | Lost | None:
-    corners = corners_between(last, gray, (last_view.depth > 0) & ~others)
+    corners = corners_between(last, gray, _usable(last_view, others))
     if corners is None or len(corners[0]) < LEAST_CORNERS:
         return Lost()
     first, second = (points.astype(np.float64) for points in corners)
     if stands(last, gray, first, second):
         return None
     motion = _agreed(first, second, last_view, np.zeros(3))
-    if motion is not None:
-        return motion
-    lost = Lost(surely=len(first) >= MANY and _stood(first, second) < HARDLY * len(first))
+    if motion is not None:  # or what moved is somebody, or too little of it is known yet
+        return motion if _bears_out(motion, first, second, last_view) else None
+    stood = int(np.count_nonzero(_stood(first, second)))
+    lost = Lost(surely=len(first) >= MANY and stood < HARDLY * len(first))
     # What has left the view is found anywhere, and from there nothing leads back.
     back, found = followed(gray, last, second.astype(np.float32))
     leads = found & (np.abs(back - first).max(axis=1) < AGREE)
@@ -291,22 +301,64 @@ def _told(
 def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
     """The motion since a picture where corners that have moved for good bear it out."""
     if anchor.corners is None:
-        anchor.corners = _corners(anchor.gray, (anchor.view.depth > 0) & ~anchor.others)
+        anchor.corners = _corners(anchor.gray, _usable(anchor.view, anchor.others))
     if len(anchor.corners) < LEAST_CORNERS:
         return None
     found, good = followed(anchor.gray, gray, anchor.corners)
     first, second = anchor.corners[good].astype(np.float64), found[good].astype(np.float64)
-    least = max(LEAST_CREEPING, CREEPING * len(first))
-    moved = np.hypot(*(second - first).T)
-    if len(first) < LEAST_CORNERS or np.count_nonzero(moved > CREEPS) < least:
+    if len(first) < LEAST_CORNERS or not _have_moved(_lengths(second - first) > CREEPS, first):
         return None
     motion = _agreed(first, second, anchor.view, np.zeros(3))
-    if motion is None:
+    if motion is None or not _bears_out(motion, first, second, anchor.view):
         return None
-    k = anchor.view.intrinsics
-    off = np.hypot(*(_projected(motion.of(_points(first, anchor.view)), k) - second).T)
-    told = (moved > CREEPS) & (off < 0.5 * moved)
-    return motion if np.count_nonzero(told) >= least else None
+    return motion
+
+
+def _bears_out(motion: Pose, first: FloatArray, second: FloatArray, view: DepthView) -> bool:
+    """Whether corners that have moved for good bear a motion out, more than others deny it.
+
+    Args:
+        motion: of the camera.
+        first: ``(n, 2)`` the corners in the picture before.
+        second: ``(n, 2)`` where they are now.
+        view: the depth before.
+    """
+    off = _lengths(_projected(motion.of(_points(first, view)), view.intrinsics) - second)
+    moved = _lengths(second - first)
+    told, denied = (moved > CREEPS) & (off < 0.5 * moved), (off > CREEPS) & (moved < 0.5 * off)
+    return _have_moved(told, first) and _share(told, first) > _share(denied, first)
+
+
+def _have_moved(which: npt.NDArray[np.bool_], corners: FloatArray) -> bool:
+    """Whether there are enough corners that have moved for good."""
+    return int(np.count_nonzero(which)) >= LEAST_CREEPING and _share(which, corners) >= CREEPING
+
+
+def _share(which: npt.NDArray[np.bool_], corners: Points) -> float:
+    """Share of the view, as far as it has corners, that some of its corners stand for, 0 to 1.
+
+    Args:
+        which: ``(n,)`` bool, those.
+        corners: ``(n, 2)`` all of them.
+    """
+    across, down = (corners / CELL).astype(np.intp).T
+    cell = down * (across.max(initial=0) + 1) + across
+    weights = 1 / np.bincount(cell)[cell]
+    return float(weights[which].sum() / weights.sum())
+
+
+def _usable(view: DepthView, others: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Pixels, ``(h, w)`` bool, that have depth and lie beside nothing that may move by itself."""
+    side = 2 * BESIDE + 1
+    about = cv2.dilate(others.view(np.uint8), np.ones((side, side), np.uint8)).view(np.bool_)
+    usable: npt.NDArray[np.bool_] = (view.depth > 0) & ~about
+    return usable
+
+
+def _lengths(steps: FloatArray) -> FloatArray:
+    """Of steps of ``(n, 2)`` pixels, ``(n,)``."""
+    lengths: FloatArray = np.hypot(*steps.T)
+    return lengths
 
 
 def _points(pixels: FloatArray, view: DepthView) -> FloatArray:
@@ -336,9 +388,9 @@ def _agreed(
     """
     points = _points(first, view)
     motion = _fitted(points, second, view.intrinsics, turn)
-    off = _projected(motion.of(points), view.intrinsics) - second
-    agreeing = np.count_nonzero(np.hypot(*off.T) < AGREE)
-    return motion if agreeing >= max(LEAST_CORNERS, LEAST_AGREEING * len(points)) else None
+    agreeing = _lengths(_projected(motion.of(points), view.intrinsics) - second) < AGREE
+    enough = np.count_nonzero(agreeing) >= LEAST_CORNERS
+    return motion if enough and _share(agreeing, first) >= LEAST_AGREEING else None
 
 
 def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray) -> Pose:
