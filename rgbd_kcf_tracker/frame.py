@@ -15,6 +15,23 @@ from rgbd_kcf_tracker.errors import ImageError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 
+NEAREST_M, FARTHEST_M = (float(np.float32(mm) * np.float32(0.001)) for mm in (1, 65535))
+"""The least and the most metres that are a reading: what 16 bits of millimetres can say, as which
+most cameras send depth. Float depth of a damaged message, of other units or of another byte order
+says anything, up to 3e38."""
+
+
+def is_reading(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
+    """Which pixels of a depth image, or of a part of it, are readings.
+
+    Args:
+        depth: float32 metres of any shape; NaN, infinity and whatever else it may hold are none.
+    """
+    with np.errstate(invalid='ignore'):  # a signalling NaN
+        good: npt.NDArray[np.bool_] = depth >= np.float32(NEAREST_M)
+        good &= depth <= np.float32(FARTHEST_M)
+    return good
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
@@ -23,7 +40,8 @@ class Frame:
     Attributes:
         color: ``(H, W, 3)`` uint8, BGR.
         depth: ``(H, W)`` float32 metres along the optical axis, registered to ``color``, NaN where
-            there is no reading; None where the camera gave no depth for this moment.
+            there is no reading; None where the camera gave no depth for this moment. What
+            :func:`is_reading` refuses counts as no reading.
         stamp_ns: time of exposure in nanoseconds.
         intrinsics: of the colour image, or None where unknown.
         pose: of the camera's optical frame in a fixed frame, or None where unknown.

@@ -271,6 +271,23 @@ def test_size_may_change_on_the_way(tmp_path: Path) -> None:
     assert any('changes from 64x48 to 32x24 at frame 3' in w for w in warnings)
 
 
+def test_metres_that_no_camera_measures_are_counted_once(tmp_path: Path) -> None:
+    frames = make_frames(3)
+    sent = camera_messages(frames, depth=None)
+    for number, frame in enumerate(frames):
+        assert frame.depth is not None
+        metres = frame.depth.copy()
+        metres[0, : 4 * number] = 1e20
+        raw = image(frame.stamp_ns, encode_depth(metres, '32FC1'))
+        sent.append(Sent(DEPTH, frame.stamp_ns, raw))
+    found, warnings = read(write_mcap(tmp_path / 'a.mcap', sent))
+    assert all(np.isnan(f.depth[0, : 4 * n]).all() for n, f in enumerate(found))
+    assert warnings == [
+        f'12 numbers in 2 depth images, first in frame 1 of {DEPTH}, are not between 0.001 and '
+        '65.535 metres: taken as no reading'
+    ]
+
+
 def test_one_damaged_depth_image_costs_its_depth_only(tmp_path: Path) -> None:
     sent = camera_messages(FRAMES)
     for number in (0, 2):

@@ -198,6 +198,28 @@ def test_bag_of_a_bag_keeps_its_names_and_metres(tmp_path: Path) -> None:
         assert '/tracker/box' in streams
 
 
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_depth_that_is_no_metres_is_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = write_folder(tmp_path / 'a')
+    images = sorted((source / 'depth').iterdir())
+    for path in images[1:3]:
+        depth = np.full((120, 160), 2.0, np.float32)
+        depth[:3, 0] = 3e38, 2000, 1e-30
+        cv2.imwrite(str(path.with_suffix('.tiff')), depth)
+        path.unlink()
+    outputs = (['--output', str(tmp_path / 'a.csv')], ['--bag', str(tmp_path / 'b.mcap')])
+    for command in (
+        ['convert', str(source), str(tmp_path / 'a.mcap')],
+        *(['track', str(source), '--variant', 'kcf', *output] for output in outputs),
+    ):
+        assert main(command) == 0
+        (line,) = capsys.readouterr().err.splitlines()
+        assert '6 numbers in 2 depth images' in line
+        assert f'{images[1].with_suffix(".tiff")}, are not between 0.001 and 65.535 metres' in line
+
+
 # -- bad input ---------------------------------------------------------------------------------
 
 

@@ -49,7 +49,7 @@ def occluded(found: DepthDifference) -> bool:
 
 
 def test_the_grid_samples_the_middle_of_the_box() -> None:
-    depth = np.arange(40 * 60, dtype=np.float32).reshape(40, 60) + 1
+    depth = np.arange(40 * 60, dtype=np.float32).reshape(40, 60) / 64 + 1
     patch = centre_patch(depth, Box(10, 4, 32, 32), 0.5)
     assert patch.shape == GRID
     # Rows 12 to 27 and columns 18 to 33 are the middle half.

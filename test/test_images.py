@@ -159,6 +159,35 @@ def test_useless_floats_are_nan() -> None:
     assert values[0, 0] == 0
 
 
+def test_floats_that_millimetres_cannot_say_are_no_reading_and_counted() -> None:
+    ends = metres_from_mm(np.array([[1, 65535]], np.uint16))
+    values = np.array([[3e38, 1e12, 65.6, 1e-4, 1e-38, np.nan, 0, np.inf, -3, 2.5]], np.float32)
+    counts: list[int] = []
+    assert np.array_equal(metres_from_float(ends, counts.append), ends)
+    assert np.isfinite(metres_from_float(values, counts.append)).tolist() == [9 * [False] + [True]]
+    assert counts == [5]
+
+
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_floats_of_every_origin_are_bounded() -> None:
+    huge = np.full(depth_image().shape, 3e38, np.float32)
+    tiff = cv2.imencode('.tiff', huge)[1].reshape(-1)
+    body = encode_compressed_depth(depth_image(), '32FC1').data.tobytes()[12:]
+    header = struct.pack('<iff', 1, 3e38, 0.5)
+    counts: list[int] = []
+    for depth in (
+        decode_depth(encode_depth(huge, '32FC1'), refused=counts.append),
+        decode_depth(encode_depth(huge, '32FC1', bigendian=True), refused=counts.append),
+        decode_compressed_depth(message(format='', data=tiff), refused=counts.append),
+        decode_compressed_depth(
+            message(format='32FC1; compressedDepth png', data=header + body), refused=counts.append
+        ),
+    ):
+        assert np.isnan(depth).all()
+    assert len(counts) == 4
+    assert counts[:3] == 3 * [huge.size]
+
+
 @pytest.mark.parametrize(
     ('change', 'words'),
     [

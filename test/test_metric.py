@@ -149,6 +149,10 @@ def odd_frames() -> list[Frame]:
     noise = np.random.default_rng(3).uniform(0.1, 9.0, (240, 320)).astype(np.float32)
     k = base.intrinsics
     stamps = iter(range(2, 100))
+    rng = np.random.default_rng(7)
+    assert base.depth is not None
+    absurd = rng.integers(0, 1 << 32, nan.shape, np.uint32).view(np.float32)
+    absurd[::2] = np.where(rng.random(nan.shape) < 0.05, np.float32(3e38), base.depth)[::2]
     return [
         Frame(base.color, depth, next(stamps) * 33_000_000, camera)
         for camera in (k, None)
@@ -159,6 +163,7 @@ def odd_frames() -> list[Frame]:
             np.full_like(nan, np.inf),
             np.full_like(nan, 1e-6),
             np.full_like(nan, -1.0),
+            absurd,
             noise,
         )
     ] + [Frame(np.zeros((240, 320, 3), np.uint8), nan, 40 * 33_000_000, k)]

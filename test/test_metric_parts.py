@@ -73,13 +73,13 @@ def test_the_view_of_an_image_is_every_step_th_pixel_as_that_of_its_depth(
     size: tuple[int, int], step: int
 ):
     image = np.random.default_rng(0).integers(0, 256, (*size, 3), dtype=np.uint8)
-    depth = image[..., 0].astype(np.float32) + 1
+    depth = image[..., 0].astype(np.float32) / 8 + 1
     view = DepthView.of(Frame(image, depth, 0), size[1] // step)
     assert view is not None
     assert view.step == step
     small = view_image(image, step, view.shape)
     assert np.array_equal(small, image[step // 2 :: step, step // 2 :: step])
-    assert np.array_equal(small[..., 0] + 1.0, view.depth)
+    assert np.array_equal(small[..., 0] / 8 + 1.0, view.depth)
 
 
 def test_the_share_of_a_surface_that_is_others_is_that_of_its_pixels():

@@ -201,6 +201,22 @@ def test_without_depth_it_follows_by_look_alone(variant: str) -> None:
 
 
 @pytest.mark.parametrize('variant', VARIANTS)
+@pytest.mark.parametrize('absurd', [3e38, 1e12, 1e-30])
+@pytest.mark.filterwarnings('error::RuntimeWarning')
+def test_depth_that_no_camera_measures_is_none(variant: str, absurd: float) -> None:
+    tracks = []
+    for odd in (absurd, np.nan):
+        tracker = create_tracker(variant)
+        tracker.start(frame(60, 0), box(60))
+        for index in range(1, 6):
+            shown = frame(60 + 2 * index, index)
+            assert shown.depth is not None
+            shown.depth[:, ::3] = odd
+            tracks.append(tracker.update(shown))
+    assert tracks[:5] == tracks[5:]
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
 def test_depth_that_comes_and_goes(variant: str) -> None:
     tracker = create_tracker(variant)
     tracker.start(frame(100, 0, with_depth=False), box(100))

@@ -178,6 +178,8 @@ def follow(args: argparse.Namespace, watched: bool = True) -> Outcome:
                 sinks.write(number, frame, tracks)
                 if watched:
                     warnings.show()
+            if watched:
+                warnings.show()
         measures = None
         if not follower.several:
             measures = _measures(boxes[first - start :], recording, first, given[0])

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Image, Mask
-from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -363,7 +363,9 @@ class ByLook:
         columns, rows = self._appearance.cells(cx, cy, self._scale)
         u = np.clip(columns, 0, frame.width - 1).astype(np.intp)
         v = np.clip(rows, 0, frame.height - 1).astype(np.intp)
-        off = np.abs(frame.depth[np.ix_(v, u)] - np.float32(self._depth))
+        depth = frame.depth[np.ix_(v, u)]
+        depth = np.where(is_reading(depth), depth, np.float32(np.nan))
+        off = np.abs(depth - np.float32(self._depth))
         near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
         about: Mask = cv2.dilate(near.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
         return about
@@ -504,5 +506,5 @@ def depth_in(frame: Frame, box: Box) -> float | None:
     depth = frame.depth[
         int(middle.y) : int(middle.bottom) + 1 : step, int(middle.x) : int(middle.right) + 1 : step
     ]
-    valid = depth[(depth > 0) & (depth < np.inf)]
+    valid = depth[is_reading(depth)]
     return float(np.median(valid)) if valid.size > MOST * depth.size else None

@@ -147,9 +147,9 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     depth = scene.view.depth[part]
     if not mine.any():
         return None
-    bins = np.bincount((depth[mine] / THICK).astype(np.intp))
+    layers, readings = np.unique((depth[mine] / THICK).astype(np.intp), return_counts=True)
     # Behind the target the same gap may show more.
-    nearest = int(np.flatnonzero(bins > 0.5 * bins.max())[0])
+    nearest = int(layers[np.argmax(readings > 0.5 * readings.max())])
     mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
     if np.count_nonzero(mine) < SCATTERED * mine.size:
         return None

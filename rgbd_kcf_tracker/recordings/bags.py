@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.recordings.images import (
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions, RecordingInfo
+from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
 from rgbd_kcf_tracker.recordings.topics import ChosenTopics, base_name, choose_topics
@@ -74,6 +75,13 @@ class BagRecording(Closing):
 
     def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
         """See :meth:`Recording.frames`."""
+        odd = RefusedReadings()
+        try:
+            yield from self._frames(start, end, odd)
+        finally:
+            odd.tell(self._warn)
+
+    def _frames(self, start: int, end: int | None, odd: RefusedReadings) -> Iterator[Frame]:
         size: tuple[int, int] | None = None
         stop = len(self) if end is None else min(end, len(self))
         for number in range(max(start, 0), stop):
@@ -85,7 +93,7 @@ class BagRecording(Closing):
                     f'{color.shape[1]}x{color.shape[0]} at frame {number}'
                 )
             size = color.shape[0], color.shape[1]
-            depth = None if pair.depth is None else self._read_depth(pair.depth, number)
+            depth = None if pair.depth is None else self._read_depth(pair.depth, number, odd)
             try:
                 yield Frame(color, depth, pair.stamp_ns, self.intrinsics)
             except ImageError as error:
@@ -151,12 +159,12 @@ class BagRecording(Closing):
             hint = mend if mends else ''
             raise ImageError(f'{where}: {error}{hint}') from None
 
-    def _read_depth(self, index: int, number: int) -> DepthImage | None:
+    def _read_depth(self, index: int, number: int, odd: RefusedReadings) -> DepthImage | None:
         assert self._depth is not None
         try:
             msg = self.bag.message(self._depth, index)
             decode = decode_compressed_depth if _compressed(self._depth) else decode_depth
-            return decode(msg, self._max_pixels)
+            return decode(msg, self._max_pixels, odd.of(f'frame {number} of {self.topics.depth}'))
         except RgbdKcfError as error:
             if isinstance(error, EncodingError):
                 raise ImageError(

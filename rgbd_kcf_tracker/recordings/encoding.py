@@ -156,8 +156,8 @@ def encode_bare_depth(depth: DepthImage, codec: str = 'tiff') -> PackedImage:
 
 def millimetres(depth: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint16]:
     """Metres as whole millimetres, 0 for no reading and for what 16 bits cannot hold."""
-    scaled = np.rint(depth * np.float32(1000))
-    with np.errstate(invalid='ignore'):
+    with np.errstate(invalid='ignore', over='ignore'):
+        scaled = np.rint(depth * np.float32(1000))
         good = (scaled > 0) & (scaled < 65536)
     return np.where(good, scaled, 0).astype(np.uint16)
 

@@ -17,9 +17,11 @@ from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, listing, read_file
 from rgbd_kcf_tracker.recordings.images import (
     DepthImage,
     EncodingError,
+    Refused,
     decode_color_bytes,
     decode_depth_bytes,
 )
+from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
 IMAGE_SUFFIXES = frozenset({'.png', '.jpg', '.jpeg', '.tif', '.tiff'})
@@ -52,17 +54,18 @@ def even_stamps(count: int, fps: float) -> tuple[int, ...]:
     return tuple(round(i * 1e9 / fps) for i in range(count))
 
 
-def metres(data: memoryview, max_pixels: int) -> DepthImage:
+def metres(data: memoryview, max_pixels: int, refused: Refused | None = None) -> DepthImage:
     """The depth in an image file as we write it.
 
     Args:
         data: all bytes of the file.
         max_pixels: of the largest image that is read.
+        refused: is told how many numbers in it are no readings, if any are.
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading.
     """
-    return decode_depth_bytes(data, max_pixels=max_pixels)
+    return decode_depth_bytes(data, max_pixels=max_pixels, refused=refused)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ class ImageFrames:
         stamps_ns: one per frame.
         intrinsics: of the colour camera.
         max_pixels: of the largest image that is read.
-        read_depth: makes metres of a depth file's bytes, up to so many pixels.
+        read_depth: makes metres of a depth file's bytes; see :func:`metres`.
     """
 
     colors: tuple[Path, ...]
@@ -83,18 +86,24 @@ class ImageFrames:
     stamps_ns: tuple[int, ...]
     intrinsics: Intrinsics | None = None
     max_pixels: int = MAX_PIXELS
-    read_depth: Callable[[memoryview, int], DepthImage] = metres
+    read_depth: Callable[[memoryview, int, Refused | None], DepthImage] = metres
 
     def __len__(self) -> int:
         return len(self.colors)
 
-    def frame(self, index: int, broken: Callable[[str], None] | None = None) -> Frame:
+    def frame(
+        self,
+        index: int,
+        broken: Callable[[str], None] | None = None,
+        odd: RefusedReadings | None = None,
+    ) -> Frame:
         """Frame ``index``.
 
         Args:
             index: from 0.
             broken: is told of a depth file that cannot be decoded, and the frame comes without;
                 None: that is an error too.
+            odd: counts what depth files hold that is no reading.
 
         Raises:
             RecordingError: for a file that cannot be read.
@@ -110,15 +119,18 @@ class ImageFrames:
         depth: DepthImage | None = None
         try:
             if depth_path is not None:
-                depth = self._depth(depth_path, broken)
+                depth = self._depth(depth_path, broken, odd)
             return Frame(color, depth, self.stamps_ns[index], self.intrinsics)
         except ImageError as error:
             raise ImageError(f'{depth_path or color_path}: {error}') from None
 
-    def _depth(self, path: Path, broken: Callable[[str], None] | None) -> DepthImage | None:
+    def _depth(
+        self, path: Path, broken: Callable[[str], None] | None, odd: RefusedReadings | None
+    ) -> DepthImage | None:
         data = memoryview(read_file(path, MAX_IMAGE))
         try:
-            return self.read_depth(data, self.max_pixels)
+            refused = None if odd is None else odd.of(str(path))
+            return self.read_depth(data, self.max_pixels, refused)
         except EncodingError:
             raise
         except ImageError as error:

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from rgbd_kcf_tracker.errors import ImageError
+from rgbd_kcf_tracker.frame import is_reading
 from rgbd_kcf_tracker.recordings import rvl
 from rgbd_kcf_tracker.recordings.containers import (
     JPEG,
@@ -39,6 +40,7 @@ from rgbd_kcf_tracker.recordings.containers import (
 
 ColorImage = npt.NDArray[np.uint8]
 DepthImage = npt.NDArray[np.float32]
+Refused = Callable[[int], None]
 
 # encoding: bytes per pixel, conversion to BGR (None: it is BGR already)
 _COLOR_ENCODINGS: dict[str, tuple[int, int | None]] = {
@@ -128,13 +130,16 @@ def decode_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
     return cast(ColorImage, cv2.cvtColor(pixels, conversion))
 
 
-def decode_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
+def decode_depth(
+    msg: Any, max_pixels: int = MAX_PIXELS, refused: Refused | None = None
+) -> DepthImage:
     """The depth of a ``sensor_msgs/Image`` (REP-118: 16UC1 millimetres or 32FC1 metres).
 
     Args:
         msg: with ``height, width, encoding, step, is_bigendian, data``; encodings:
             :data:`DEPTH_ENCODINGS`.
         max_pixels: of the largest image that is read.
+        refused: see :func:`metres_from_float`.
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading; memory of its own.
@@ -142,7 +147,10 @@ def decode_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
     Raises:
         ImageError: for an unknown encoding or sizes that do not fit the data.
     """
-    return np.asarray(defer_depth(msg, max_pixels))
+    values = _depth_values(msg, max_pixels)
+    if values.dtype.kind == 'u':
+        return metres_from_mm(values)
+    return metres_from_float(values, refused)
 
 
 def defer_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
@@ -151,14 +159,9 @@ def defer_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
     Raises:
         ImageError: as :func:`decode_depth`.
     """
-    encoding = str(msg.encoding)
-    if encoding not in _DEPTH_ENCODINGS:
-        raise EncodingError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
-    kind = _DEPTH_ENCODINGS[encoding]
-    rows = np.ascontiguousarray(_rows(msg, int(kind[1]), max_pixels))
-    values = rows.view(('>' if msg.is_bigendian else '<') + kind)
-    made = DeferredDepth(values, metres_from_mm if kind == 'u2' else metres_from_float)
-    return cast(DepthImage, made)
+    values = _depth_values(msg, max_pixels)
+    convert = metres_from_mm if values.dtype.kind == 'u' else metres_from_float
+    return cast(DepthImage, DeferredDepth(values, convert))
 
 
 def decode_compressed_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
@@ -177,7 +180,9 @@ def decode_compressed_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImag
     return decode_color_bytes(as_bytes(msg.data), max_pixels)
 
 
-def decode_compressed_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
+def decode_compressed_depth(
+    msg: Any, max_pixels: int = MAX_PIXELS, refused: Refused | None = None
+) -> DepthImage:
     """The depth of a ``sensor_msgs/CompressedImage``.
 
     Understood are compressed_depth_image_transport's PNG and RVL behind its 12-byte header, for
@@ -187,6 +192,7 @@ def decode_compressed_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImag
     Args:
         msg: with ``format, data``.
         max_pixels: of the largest image that is read.
+        refused: see :func:`metres_from_float`.
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading.
@@ -194,7 +200,7 @@ def decode_compressed_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImag
     Raises:
         ImageError: for data that is none of these, is cut off, or claims an unbelievable size.
     """
-    return decode_depth_bytes(as_bytes(msg.data), str(msg.format), max_pixels)
+    return decode_depth_bytes(as_bytes(msg.data), str(msg.format), max_pixels, refused)
 
 
 def decode_color_bytes(data: memoryview, max_pixels: int = MAX_PIXELS) -> ColorImage:
@@ -218,7 +224,10 @@ def decode_color_bytes(data: memoryview, max_pixels: int = MAX_PIXELS) -> ColorI
 
 
 def decode_depth_bytes(
-    data: memoryview, text: str = '', max_pixels: int = MAX_PIXELS
+    data: memoryview,
+    text: str = '',
+    max_pixels: int = MAX_PIXELS,
+    refused: Refused | None = None,
 ) -> DepthImage:
     """The depth in compressed bytes; see :func:`decode_compressed_depth`.
 
@@ -226,12 +235,13 @@ def decode_depth_bytes(
         data: all bytes of the message or file.
         text: the message's ``format``.
         max_pixels: of the largest image that is read.
+        refused: see :func:`metres_from_float`.
     """
     kind = sniff(data)
     if kind == JPEG:
         raise EncodingError('depth is JPEG, which spoils it: record compressedDepth or raw depth')
     if kind in (PNG, TIFF):
-        return _bare_depth(data, max_pixels)
+        return _bare_depth(data, max_pixels, refused)
     if len(data) <= _COMPRESSED_DEPTH_HEADER.size:
         raise ImageError(f'compressed depth has only {len(data)} bytes: the message is cut off')
     _, a, b = _COMPRESSED_DEPTH_HEADER.unpack_from(data)
@@ -244,7 +254,7 @@ def decode_depth_bytes(
         raise ImageError(f'compressed depth {text!r} holds no PNG: the message is damaged')
     if pixel_format(text) != '32FC1':
         return metres_from_mm(values)
-    return _metres_from_inverse(values, a, b)
+    return _metres_from_inverse(values, a, b, refused)
 
 
 def pixel_format(text: str) -> str:
@@ -264,18 +274,25 @@ def metres_from_mm(values: npt.NDArray[np.uint16]) -> DepthImage:
     return out
 
 
-def metres_from_float(values: npt.NDArray[np.float32]) -> DepthImage:
-    """A copy in native byte order; what is not finite or not above 0 becomes NaN.
+def metres_from_float(
+    values: npt.NDArray[np.float32], refused: Refused | None = None
+) -> DepthImage:
+    """A copy in native byte order; what is no reading (:func:`is_reading`) becomes NaN.
 
     Args:
         values: ``(H, W)`` float32 metres in either byte order.
+        refused: is told how many of them are finite and above 0 and yet no reading, if any are.
 
     Returns:
         ``(H, W)`` float32 metres.
     """
     out = values.astype(np.float32)
-    with np.errstate(invalid='ignore'):
-        good = (out > 0) & (out < np.inf)
+    good = is_reading(out)
+    if refused is not None:
+        with np.errstate(invalid='ignore'):
+            meant = np.count_nonzero((out > 0) & (out < np.inf))
+        if meant > np.count_nonzero(good):
+            refused(int(meant - np.count_nonzero(good)))
     bits = out.view(np.int32)
     np.bitwise_or(bits, np.subtract(good, 1, dtype=np.int32), out=bits)
     return out
@@ -291,6 +308,16 @@ def as_bytes(data: Any) -> memoryview:
         except (TypeError, ValueError):
             raise ImageError(f'image data is a {type(data).__name__}, not bytes') from None
     return view if view.format == 'B' and view.ndim == 1 and view.contiguous else view.cast('B')
+
+
+def _depth_values(msg: Any, max_pixels: int) -> npt.NDArray[Any]:
+    """``(H, W)`` millimetres or metres as they are in the message, in its byte order."""
+    encoding = str(msg.encoding)
+    if encoding not in _DEPTH_ENCODINGS:
+        raise EncodingError(_unknown_encoding('depth', encoding, _DEPTH_ENCODINGS))
+    kind = _DEPTH_ENCODINGS[encoding]
+    rows = np.ascontiguousarray(_rows(msg, int(kind[1]), max_pixels))
+    return rows.view(('>' if msg.is_bigendian else '<') + kind)
 
 
 def _rows(msg: Any, bytes_per_pixel: int, max_pixels: int) -> npt.NDArray[np.uint8]:
@@ -314,7 +341,7 @@ def _rows(msg: Any, bytes_per_pixel: int, max_pixels: int) -> npt.NDArray[np.uin
     return np.lib.stride_tricks.as_strided(flat, (height, needed), (step, 1))
 
 
-def _bare_depth(data: memoryview, max_pixels: int) -> DepthImage:
+def _bare_depth(data: memoryview, max_pixels: int, refused: Refused | None) -> DepthImage:
     container = inspect(data, max_pixels)
     if container.channels != 1 or container.bits not in (16, 32):
         raise EncodingError(
@@ -325,7 +352,7 @@ def _bare_depth(data: memoryview, max_pixels: int) -> DepthImage:
     if values.dtype == np.uint16:
         return metres_from_mm(cast(Any, values))
     if values.dtype == np.float32:
-        return metres_from_float(cast(Any, values))
+        return metres_from_float(cast(Any, values), refused)
     raise EncodingError(f'depth {container.name} holds {values.dtype}: uint16 or float32 expected')
 
 
@@ -354,13 +381,15 @@ def _imdecode(data: memoryview, flags: int, container: Container) -> Any:
     return image
 
 
-def _metres_from_inverse(values: npt.NDArray[np.uint16], a: float, b: float) -> DepthImage:
+def _metres_from_inverse(
+    values: npt.NDArray[np.uint16], a: float, b: float, refused: Refused | None
+) -> DepthImage:
     if not (math.isfinite(a) and math.isfinite(b)) or a <= 0:
         raise ImageError(f'compressed 32FC1 depth has parameters A={a:g} B={b:g}: A must be > 0')
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         out = np.float32(a) / (values.astype(np.float32) - np.float32(b))
     out[values == 0] = np.nan
-    return metres_from_float(out)
+    return metres_from_float(out, refused)
 
 
 def _unknown_encoding(what: str, encoding: str, known: dict[str, Any]) -> str:

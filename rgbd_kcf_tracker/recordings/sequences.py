@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.recordings.recording import (
     RecordingInfo,
     StreamInfo,
 )
+from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.textfiles import (
     folder_intrinsics,
     known,
@@ -92,8 +93,12 @@ class SequenceFolder(Closing):
 
     def frames(self, start: int = 0, end: int | None = None) -> Iterator[Frame]:
         """See :meth:`Recording.frames`."""
-        for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
-            yield self._files.frame(index, self.warnings.append)
+        odd = RefusedReadings()
+        try:
+            for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
+                yield self._files.frame(index, self.warnings.append, odd)
+        finally:
+            odd.tell(self.warnings.append)
 
     def info(self) -> RecordingInfo:
         """See :meth:`Recording.info`."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.frame import is_reading
 from rgbd_kcf_tracker.geometry import Box
 
 Depth = npt.NDArray[np.float32]
@@ -31,7 +32,7 @@ def centre_patch(depth: Depth, box: Box, share: float) -> Depth:
     rows, inside_rows = _places(box.cy, box.height * share, GRID[0], depth.shape[0])
     cols, inside_cols = _places(box.cx, box.width * share, GRID[1], depth.shape[1])
     patch: Depth = depth[rows[:, None], cols]
-    patch[~(patch > 0)] = np.nan
+    patch[~is_reading(patch)] = np.nan
     patch[~inside_rows] = np.inf
     patch[:, ~inside_cols] = np.inf
     return patch

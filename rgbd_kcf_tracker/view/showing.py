@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.insight import Considered, Insight
 from rgbd_kcf_tracker.recordings.evidence_messages import (
@@ -286,7 +286,7 @@ def depth_picture(
         ``(h, w, 3)`` uint8 BGR, light grey where there is no reading, and metres.
     """
     small = _scaled(depth, width, cv2.INTER_NEAREST)
-    valid = np.isfinite(small) & (small > 0)
+    valid = is_reading(small)
     some = small[::8, ::8][valid[::8, ::8]]
     # Whole metres, so that colours do not flicker with every frame.
     far = float(np.ceil(np.quantile(some, 0.95))) if some.size else 1.0

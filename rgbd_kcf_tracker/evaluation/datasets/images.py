@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.containers import inspect
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
-from rgbd_kcf_tracker.recordings.images import metres_from_mm
+from rgbd_kcf_tracker.recordings.images import Refused, metres_from_mm
 
 
 def with_truth(
@@ -83,7 +83,9 @@ def shifted(box: Box | None, by: float) -> Box | None:
     return None if box is None else box.moved(by, by)
 
 
-def princeton_depth(data: memoryview, max_pixels: int) -> npt.NDArray[np.float32]:
+def princeton_depth(
+    data: memoryview, max_pixels: int, _refused: Refused | None = None
+) -> npt.NDArray[np.float32]:
     """Metres of a depth file as Princeton stores it, see :func:`unrotate`.
 
     Raises:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 DepthArray = npt.NDArray[np.float32]
@@ -62,8 +62,8 @@ class DepthView:
         depth = np.array(frame.depth[half::step, half::step])
         if half:
             other = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]]
-            np.copyto(depth, other, where=~(depth > 0))
-        depth[~((depth > 0) & (depth < np.inf))] = 0.0
+            np.copyto(depth, other, where=~is_reading(depth))
+        depth[~is_reading(depth)] = 0.0
         k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
         return cls(
             depth,
