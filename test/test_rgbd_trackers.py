@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+import tracemalloc
 from collections.abc import Iterator
 
 import cv2
@@ -13,6 +14,7 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.thesis import at_once
 from rgbd_kcf_tracker.thesis.rgbd import RgbdParameters
 from rgbd_kcf_tracker.thesis.rgbd_pf import RgbdPfParameters
 from rgbd_kcf_tracker.variants import default_parameters
@@ -214,6 +216,33 @@ def test_depth_that_no_camera_measures_is_none(variant: str, absurd: float) -> N
             shown.depth[:, ::3] = odd
             tracks.append(tracker.update(shown))
     assert tracks[:5] == tracks[5:]
+
+
+@pytest.mark.parametrize(
+    ('variant', 'greedy'),
+    [
+        ('rgbd', {'search_span': 20.0, 'search_step': 0.02, 'padding': 4.0}),
+        ('rgbd_pf', {'particles': 500, 'color_bins': 32}),
+    ],
+)
+def test_memory_does_not_grow_with_windows_or_particles(
+    variant: str, greedy: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answers = []
+    for most in (at_once.MOST_AT_ONCE, 1 << 40):
+        monkeypatch.setattr(at_once, 'MOST_AT_ONCE', most)
+        tracker = create_tracker(variant, default_parameters(variant).replace(**greedy))
+        tracker.start(frame(60, 0), box(60))
+        tracks = [tracker.update(frame(62, 1))]
+        tracemalloc.start()
+        try:
+            tracks.append(tracker.update(frame(64, 2)))
+            answers.append((tracks, tracemalloc.get_traced_memory()[1]))
+        finally:
+            tracemalloc.stop()
+    (tracks, peak), (others, before) = answers
+    assert tracks == others
+    assert peak < 40e6 < 150e6 < before
 
 
 @pytest.mark.parametrize('variant', VARIANTS)

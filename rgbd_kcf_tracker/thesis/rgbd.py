@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
+from rgbd_kcf_tracker.features.hog import CELL_SIZE, CHANNELS, HogExtractor
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.parameters import parameter
+from rgbd_kcf_tracker.thesis.at_once import batches
 from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker, DepthParameters
 from rgbd_kcf_tracker.thesis.depth_patch import DepthDifference
 from rgbd_kcf_tracker.thesis.kcf import Detection, KcfModel
@@ -123,13 +124,20 @@ class RgbdTracker(DepthAwareTracker):
         inside = ((cx >= 0) & (cx <= frame.width)) | (offsets == 0)
         strip = self._strip(frame, model, offsets)
         offsets, cx = offsets[inside], cx[inside]
-        stack = windows(strip, model.taper, offsets)
-        # The first template beside the model: nothing that was learned by mistake has touched it.
-        responses = np.maximum(model.filter.respond(stack), model.first.respond(stack))
         middle = int(np.flatnonzero(offsets == 0)[0])
-        index = int(np.argmax(responses.max(axis=(1, 2))))
-        best = model.place(responses[index], float(cx[index]), self._box.cy)
-        return best, model.place(responses[middle], self._box.cx, self._box.cy)
+        index, highest = -1, -np.inf
+        for part in batches(len(offsets), CHANNELS * model.taper.size):
+            stack = windows(strip, model.taper, offsets[part])
+            # The first template beside the model: nothing learned by mistake has touched it.
+            responses = np.maximum(model.filter.respond(stack), model.first.respond(stack))
+            tops = responses.max(axis=(1, 2))
+            first = int(np.argmax(tops))
+            if index < 0 or tops[first] > highest:
+                index, highest, response = part.start + first, tops[first], responses[first]
+            if part.start <= middle < part.stop:
+                here = responses[middle - part.start]
+        best = model.place(response, float(cx[index]), self._box.cy)
+        return best, model.place(here, self._box.cx, self._box.cy)
 
     def _strip(
         self, frame: Frame, model: KcfModel, offsets: npt.NDArray[np.int64]

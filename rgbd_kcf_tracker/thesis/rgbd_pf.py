@@ -20,6 +20,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import parameter
+from rgbd_kcf_tracker.thesis.at_once import batches
 from rgbd_kcf_tracker.thesis.color_histogram import ColorHistogram, bhattacharyya_distance
 from rgbd_kcf_tracker.thesis.depth_aware import DepthAwareTracker, DepthParameters
 from rgbd_kcf_tracker.thesis.kcf import Detection, KcfModel
@@ -215,8 +216,15 @@ class RgbdPfTracker(DepthAwareTracker):
         """Likelihood of each particle by the colours of its region."""
         sigma = self._parameters.color_sigma
         regions = self._particles.states[:, [X, Y, WIDTH, HEIGHT]]
-        colors = self._histogram(frame.color, regions)
-        distance = bhattacharyya_distance(colors, self._target_colors)
+        parts = batches(len(regions), self._target_colors.size)
+        distance = np.concatenate(
+            [
+                bhattacharyya_distance(
+                    self._histogram(frame.color, regions[part]), self._target_colors
+                )
+                for part in parts
+            ]
+        )
         self._particles.update(normal_likelihood(np.minimum(distance, _UNLIKE), sigma))
 
     def _observe(self, found: Detection) -> None:

@@ -280,9 +280,17 @@ def _search_space(moment: Moment, hidden: Moment | None) -> Picture:
     )  # fmt: skip
 
 
+def _kernels(moment: Moment) -> Array:
+    """``(n, rows, cols)``: how alike each window is to what was learned, at all shifts."""
+    stacks = [c.value for c in moment.of('thesis.correlation:_gaussian') if c.value.ndim == 3]
+    # Each batch of windows is asked of the filter that goes on learning, then of the first.
+    kernels: Array = np.concatenate(stacks[::2])
+    return kernels
+
+
 def _correlations(moment: Moment) -> Picture:
     search = moment.of(_SEARCH)[0]
-    kernels = moment.of('thesis.correlation:_gaussian')[0].value
+    kernels = _kernels(moment)
     index = search.found['index']
     kernel = kernels[index]
     figure = plot_style.figure(9.5, 4.2)
@@ -299,7 +307,7 @@ def _correlations(moment: Moment) -> Picture:
     plot_style.tidy(axes)
     return Picture(
         '4.10', 'correlations', 'Correlation with every patch of the search space',
-        'The features of every window are compared with those learned, all windows in one batch. '
+        'The features of every window are compared with those learned, many windows at once. '
         'At the right the highest likeness of each window, at the left that of the best one at all '
         'its shifts.',
         r'k^{xz} = \exp\left(-\frac{1}{\sigma^2 N}\left(\Vert x\Vert^2 + \Vert z\Vert^2'
@@ -315,7 +323,7 @@ def _responses(shown: list[tuple[str, Moment]]) -> Picture:
     peaks: list[float] = []
     for index, (word, moment) in enumerate(shown):
         search = moment.of(_SEARCH)[0]
-        response = search.found['responses'][search.found['index']]
+        response = search.found['response']
         best = search.value[0]
         axes = figure.add_subplot(2, len(shown), index + 1)
         show_image(axes, rgb(moment.frame), f'{word}: frame {moment.number}')

@@ -179,11 +179,12 @@ def _histogram(moments: ParticleMoments) -> Picture:
     distances = moments.asked.of(name_of(bhattacharyya_distance))
     every = moments.asked.of(histogram)
     if distances and every:
-        d = distances[0].value
+        # A batch of particles a call.
+        d, p = (np.concatenate([call.value for call in calls]) for calls in (distances, every))
         nearest, farthest = int(np.argmin(d)), int(np.argmax(d))
-        shown.append((f'most alike particle, d = {d[nearest]:.2f}', every[0].value[nearest]))
-        shown.append((f'least alike particle, d = {d[farthest]:.2f}', every[0].value[farthest]))
-        values |= {'distance': d, 'histograms': every[0].value}
+        shown.append((f'most alike particle, d = {d[nearest]:.2f}', p[nearest]))
+        shown.append((f'least alike particle, d = {d[farthest]:.2f}', p[farthest]))
+        values |= {'distance': d, 'histograms': p}
         words = (
             ' Beside it the particle whose box is the most alike in colours, and the least alike: '
             f'the distances are {d[nearest]:.2f} and {d[farthest]:.2f}.'
