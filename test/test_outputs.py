@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.recordings import (
     open_recording,
     outputs,
 )
-from rgbd_kcf_tracker.recordings.outputs import OutputFile, OutputFolder, check_outputs
+from rgbd_kcf_tracker.recordings.outputs import OutputFile, OutputFolder, check_held, check_outputs
 from rgbd_kcf_tracker.track import Track, TrackState
 
 FRAMES = make_frames(4)
@@ -163,6 +163,51 @@ def test_a_linked_image_of_a_sequence_is_the_source(
     )
     assert 'is the source itself' in error
     assert digest(images) == before
+
+
+@pytest.mark.parametrize('command', ['evaluate', 'sweep'])
+def test_no_link_in_a_report_leads_into_its_source(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = write_folder(tmp_path / 'seq')
+    report = tmp_path / 'report'
+    (report / 'results' / 'kcf').mkdir(parents=True)
+    (report / 'runs.jsonl').touch()
+    # A source and a larger disk may lie there; of the former, too, a file may have two names.
+    (tmp_path / 'disk' / 'here').mkdir(parents=True)
+    (report / 'thumbs').symlink_to(tmp_path / 'disk')
+    before = digest(source)
+    more = ['--param', 'kcf.padding=1,2'] if command == 'sweep' else ['--variants', 'kcf']
+    for name, link, to, words in (
+        ('runs.jsonl', os.link, 'groundtruth.txt', 'the source itself'),
+        ('runs.jsonl', os.symlink, 'rgb/new.txt', 'leads into the source'),
+        ('truth', os.symlink, '', 'the source itself'),
+        ('results/kcf', os.symlink, 'rgb', 'leads into the source'),
+        ('thumbs/here', os.symlink, 'depth', 'leads into the source'),
+        ('.write', os.symlink, 'rgb/000001.png', 'leads into the source'),
+    ):
+        place = report / name
+        if place.is_dir():
+            place.rmdir()
+        place.unlink(missing_ok=True)
+        link(source / to, place)
+        error = refused(capsys, command, source, *more, '--report', report)
+        assert f'{place} ' in error
+        assert words in error
+        assert digest(source) == before
+        place.unlink()
+        if name == 'runs.jsonl':
+            place.touch()
+
+
+def test_a_report_may_be_linked_elsewhere_and_lie_beside_its_source(tmp_path: Path) -> None:
+    source = write_folder(tmp_path / 'seq')
+    os.link(source / 'groundtruth.txt', source / 'other.txt')
+    (tmp_path / 'disk').mkdir()
+    (tmp_path / 'thumbs').symlink_to(tmp_path / 'disk')
+    (tmp_path / 'loop').symlink_to(tmp_path)
+    check_held(tmp_path, [source])
+    check_held(tmp_path / 'none', [source])
 
 
 def test_what_sqlite_keeps_beside_a_database_is_the_source(tmp_path: Path) -> None:

@@ -241,14 +241,14 @@ def end(failures: Sequence[Failure]) -> int:
 
 
 def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None:
-    """Refuse a folder that lies in the data, or holds other things than a report.
+    """Refuse a folder that lies in the data, holds links to it, or other things than a report.
 
     Raises:
         RecordingError: where it does.
     """
     from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
     from rgbd_kcf_tracker.evaluation.report import BEGUN_NAMES
-    from rgbd_kcf_tracker.recordings.outputs import check_outputs
+    from rgbd_kcf_tracker.recordings.outputs import check_held, check_outputs
 
     sources = [text for text in datasets if not text.startswith(PREFIX)]
     check_outputs({'--report': folder}, sources, overwrite=True, folders=('--report',))
@@ -261,6 +261,7 @@ def check_report(folder: Path, datasets: Sequence[str], overwrite: bool) -> None
             f'{folder} is there already, and is no report: give another name, or add '
             '--overwrite to write into it'
         )
+    check_held(folder, sources)
 
 
 @contextlib.contextmanager

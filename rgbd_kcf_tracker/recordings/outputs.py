@@ -116,6 +116,33 @@ def refuse_standard_output(option: str, given: str | os.PathLike[str]) -> None:
         )
 
 
+def check_held(folder: Path, sources: Sequence[str | os.PathLike[str]]) -> None:
+    """Refuse a folder to write into in which a source, or what lies in one, has another name.
+
+    A link that leads elsewhere, to a larger disk perhaps, may be there.
+
+    Args:
+        folder: which may not be there yet.
+        sources: as :func:`check_outputs` takes them; what is named there may lie in the folder.
+
+    Raises:
+        RecordingError: naming the link.
+    """
+    parts = list(dict.fromkeys(part for source in sources for part in _parts(source)))
+    links = list(_links_in(folder, {_own_place(part) for part in parts}))
+    if not links:  # which is so but for accidents: no source need be looked through
+        return
+    there = [found for path in links if (found := _stat(_target(path))) is not None]
+    read, around = _read_among(there, parts), _finder(parts)
+    for path in links:
+        target = _target(path)
+        found = _stat(target)
+        if source := around(target.parent):
+            raise RecordingError(f'{path} leads into the source {source}: remove this link')
+        if found is not None and _identity(found) in read:
+            raise RecordingError(f'{path} is the source itself by another name: remove it')
+
+
 def make_folder(path: Path) -> None:
     """A folder to write into; it may be there. The folder that it lies in must be.
 
@@ -477,6 +504,41 @@ def _finder(sources: Sequence[str]) -> Callable[[Path], str | None]:
     return find
 
 
+def _own_place(path: str | os.PathLike[str]) -> str:
+    """A path whose folder is told without links, though it may be a link itself."""
+    folder, name = os.path.split(os.path.abspath(path))
+    return os.path.join(os.path.realpath(folder), name)
+
+
+def _links_in(folder: Path, but: set[str]) -> Iterator[Path]:
+    """What a folder holds, at any depth, that may have another name: by links of either kind.
+
+    What lies at one of the places ``but`` is left out.
+    """
+    seen: set[Identity] = set()
+    for place, subfolders, names in os.walk(folder, followlinks=True):
+        inside = [name for name in subfolders if _own_place(os.path.join(place, name)) not in but]
+        for path in (Path(place, name) for name in (*inside, *names)):
+            with contextlib.suppress(OSError):  # it went meanwhile
+                there = path.lstat()
+                linked = stat.S_ISLNK(there.st_mode) or (
+                    stat.S_ISREG(there.st_mode) and there.st_nlink > 1
+                )
+                if linked and _own_place(path) not in but:
+                    yield path
+        subfolders[:] = [name for name in inside if _is_new(os.path.join(place, name), seen)]
+
+
+def _is_new(folder: str, seen: set[Identity]) -> bool:
+    """Whether a folder was not seen yet: links may lead in circles. Now it was."""
+    with contextlib.suppress(OSError):
+        identity = _identity(os.stat(folder))
+        new = identity not in seen
+        seen.add(identity)
+        return new
+    return False
+
+
 def _read_among(outputs: Sequence[os.stat_result], sources: Sequence[str]) -> set[Identity]:
     """Those of the outputs that are sources, or files in them."""
     among = {_identity(there) for there in outputs}
@@ -496,10 +558,4 @@ def _identities(path: str, files: bool) -> Iterator[Identity]:
         for name in names:
             with contextlib.suppress(OSError):
                 yield _identity(os.stat(os.path.join(folder, name)))
-        # Links may lead in circles.
-        for name in list(subfolders):
-            with contextlib.suppress(OSError):
-                identity = _identity(os.stat(os.path.join(folder, name)))
-                if identity in seen:
-                    subfolders.remove(name)
-                seen.add(identity)
+        subfolders[:] = [name for name in subfolders if _is_new(os.path.join(folder, name), seen)]
