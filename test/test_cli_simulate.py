@@ -143,6 +143,12 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFi
         (['x.mcap', '--size', '0x0'], 'size'),
         (['x.mcap', '--duration', '-1'], 'duration'),
         (['x.mcap', '--count', '0'], '--count'),
+        (['x', '--count', '999999999999'], '--count is 999999999999: give 1 to 10000'),
+        (
+            ['x', '--count', '10000', '--scenario', 'normal', '--scenario', 'crowd'],
+            'give 1 to 5000',
+        ),
+        (['--contact-sheet', 'x.jpg', '--count', '1001'], 'give 1 to 1000'),
         (['x.mcap', '--count', '2'], 'name a folder'),
         (['x', '--format', 'mcap'], '.mcap'),
         ([], 'DEST'),

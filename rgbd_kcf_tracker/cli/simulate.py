@@ -22,6 +22,10 @@ WriterContext: TypeAlias = AbstractContextManager[WriteFrame]
 
 NAME = 'simulate'
 HELP = 'record simulated scenes with exact ground truth'
+MOST_SCENES, MOST_DRAWN = 10_000, 1000
+"""Scenes that are recorded, or drawn into one picture, at the most. All places are looked at before
+the first scene is rendered, and more than these are a mistake: 10000 scenes as they are by default
+take a terabyte, and a JPEG file holds 65500 rows."""
 _EPILOG = """\
 examples:
   rgbd-kcf simulate --list
@@ -122,9 +126,11 @@ def run(args: argparse.Namespace) -> int:
         raise ParameterError(
             'name DEST, an .mcap file or a folder to write, or --contact-sheet FILE'
         )
-    if args.count < 1:
-        raise ParameterError(f'--count is {args.count}: give 1 or more')
     names = expand_names(args.scenario or ['normal'])
+    most = (MOST_SCENES if args.contact_sheet is None else MOST_DRAWN) // len(names)
+    if not 1 <= args.count <= most:
+        of = f' of {len(names)} scenarios' if len(names) > 1 else ''
+        raise ParameterError(f'--count is {args.count}: give 1 to {most}{of}')
     size = _parse_size(args.size)
     for name in names:  # find every mistake before anything is written
         check_request(name, args.seed, args.rate, args.duration, size)
