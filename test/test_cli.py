@@ -575,16 +575,34 @@ def test_a_standard_stream_that_is_closed_is_no_output_file(
     assert main(['info', str(bag), '--check']) == 0
 
 
-def test_what_standard_output_cannot_take_is_told(folder: Path, tmp_path: Path) -> None:
-    there = tmp_path / 'no ASCII: \u00fc'
-    there.symlink_to(folder)
+def test_a_table_is_not_computed_for_a_standard_output_that_is_closed(folder: Path) -> None:
+    run = ['sh', '-c', 'exec "$@" >&-', 'sh', *program('track', str(folder), '--output', '-')]
+    ended = subprocess.run(run, env=ENVIRONMENT, capture_output=True, check=False)
+    assert ended.returncode == 2
+    assert ended.stderr == (
+        b'rgbd-kcf: error: --output - is standard output, which is closed: give a file\n'
+    )
+
+
+@pytest.mark.parametrize('unbuffered', ['', '1'])
+@pytest.mark.parametrize('words', [('track', '--help'), ('--version',), ('info', '{folder}')])
+def test_help_and_answers_that_cannot_be_written_are_told(
+    words: tuple[str, ...], unbuffered: str, folder: Path
+) -> None:
     with open('/dev/full', 'wb') as full:
         ended = subprocess.run(
-            program('info', str(there)), env=ENVIRONMENT, stdout=full,
-            stderr=subprocess.PIPE, check=False,
+            program(*(word.format(folder=folder) for word in words)),
+            env=ENVIRONMENT | {'PYTHONUNBUFFERED': unbuffered},
+            stdout=full, stderr=subprocess.PIPE, check=False,
         )  # fmt: skip
     assert ended.returncode == 2
     assert ended.stderr.startswith(b'rgbd-kcf: error: standard output, ')
+    assert ended.stderr.count(b'\n') == 1
+
+
+def test_standard_output_that_knows_no_letter_gets_its_number(folder: Path, tmp_path: Path) -> None:
+    there = tmp_path / 'no ASCII: \u00fc'
+    there.symlink_to(folder)
     ended = subprocess.run(
         program('info', str(there)),
         env=ENVIRONMENT | {'PYTHONIOENCODING': 'ascii'},

@@ -53,6 +53,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f'{PROGRAM}: interrupted', file=sys.stderr)
         return 130
+    finally:
+        _drop_unwritable()
 
 
 def _run(arguments: list[str]) -> int:
@@ -81,12 +83,7 @@ def _run(arguments: list[str]) -> int:
         print(f'{PROGRAM}: error: {error.name} is missing: {HOW_TO_GET_THEM}', file=sys.stderr)
         return EXIT_USAGE
     except BrokenPipeError:
-        # The reader of our output is gone (``| head``): nothing is left to say.
-        import contextlib
-
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        return 1  # the reader of our output is gone (``| head``): nothing is left to say
     except OSError as error:
         name = f'{error.filename}: ' if error.filename else _unnamed(error.errno)
         print(f'{PROGRAM}: error: {name}{error.strerror or error}', file=sys.stderr)
@@ -107,6 +104,15 @@ def _open_closed_streams() -> None:
                 os.close(nowhere)
         stream = open(os.devnull, 'w' if number else 'r', encoding='utf-8')  # noqa: SIM115
         setattr(sys, name, stream)
+
+
+def _drop_unwritable() -> None:
+    """What standard output did not take was told: Python would try again, and end with 120."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.stdout.flush()
 
 
 def _unnamed(number: int | None) -> str:
@@ -162,9 +168,18 @@ def _joined(arguments: list[str]) -> list[str]:
 def _parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
     import argparse
     import importlib
-    from typing import cast
+    from typing import Any, cast
 
-    parser = argparse.ArgumentParser(
+    class Parser(argparse.ArgumentParser):
+        def _print_message(self, message: str, file: Any = None) -> None:
+            """As argparse does, which does not mind where what ``--help`` says gets lost."""
+            if file is not sys.stdout:
+                super()._print_message(message, file)
+                return
+            file.write(message)
+            file.flush()
+
+    parser = Parser(
         prog=PROGRAM,
         description='Follow one target in colour and depth, in recordings and benchmarks. '
         'The live nodes are started with ros2 run or ros2 launch.',

@@ -349,6 +349,8 @@ def _check_outputs(args: argparse.Namespace) -> None:
             f'--output {args.output} would be CSV: Parquet is written into a folder, '
             'by --table parquet --output FOLDER'
         )
+    if args.output == '-' and sys.__stdout__ is None:
+        raise ParameterError('--output - is standard output, which is closed: give a file')
     outputs = {f'--{name}': getattr(args, name) for name in ('output', 'mot', 'video', 'bag')}
     if outputs['--output'] == '-':
         del outputs['--output']
