@@ -189,6 +189,9 @@ def test_otb_annotations_and_images_of_different_number(tmp_path: Path):
     assert 'img/0003.jpg is missing' in message
     truth.write_text('1,1,5,5\n' * 2)
     assert f'{truth}, line 2: the file ends here' in error_of(path)
+    (path / 'img' / '0002.jpg').rename(path / 'img' / 'two.jpg')
+    truth.write_text('1,1,5,5\n' * 3)
+    assert 'two.jpg has no number in its name, as other images there have' in error_of(path)
 
 
 def test_a_line_that_is_no_box_is_named(tmp_path: Path):

@@ -237,6 +237,44 @@ def test_ground_truth_of_another_length(tmp_path: Path) -> None:
         assert any('5 lines for 3 images' in w for w in recording.warnings)
 
 
+@pytest.mark.parametrize('lost', [1, 2, 3])
+def test_truth_by_number_is_left_out_where_an_image_is_missing(lost: int, tmp_path: Path) -> None:
+    folder(tmp_path, count=4)
+    boxes = ''.join(f'{number},2,3,4\n' for number in range(1, 5))
+    for name in ('groundtruth.txt', 'groundtruth_body.txt'):
+        (tmp_path / name).write_text(boxes)
+    missing = tmp_path / 'rgb' / f'{lost:06d}.png'
+    missing.unlink()
+    with open_recording(tmp_path) as recording:
+        assert recording.groundtruth is None
+        assert recording.groundtruth_body is None
+        told = [w for w in recording.warnings if f'{missing} is missing' in w]
+        assert [w.split()[0] for w in told] == ['groundtruth.txt', 'groundtruth_body.txt']
+    (tmp_path / 'timestamps.txt').write_text('1\n2\n3\n4\n')
+    with pytest.raises(RecordingError, match=f'000{lost:03d}.png is missing'):
+        open_recording(tmp_path)
+
+
+def test_what_is_missing_at_the_end_shifts_no_truth(tmp_path: Path) -> None:
+    folder(tmp_path, count=4)
+    (tmp_path / 'groundtruth.txt').write_text('1,2,3,4\n' * 4)
+    (tmp_path / 'rgb' / '000004.png').unlink()
+    with open_recording(tmp_path) as recording:
+        assert recording.groundtruth == [Box(1, 2, 3, 4)] * 3
+
+
+def test_an_image_without_a_number_among_others_has_no_line(tmp_path: Path) -> None:
+    folder(tmp_path)
+    (tmp_path / 'rgb' / '000002.png').rename(tmp_path / 'rgb' / 'second.png')
+    (tmp_path / 'groundtruth.txt').write_text('1,2,3,4\n' * 3)
+    with open_recording(tmp_path) as recording:
+        assert recording.groundtruth is None
+        assert any('second.png has no number in its name' in w for w in recording.warnings)
+    (tmp_path / 'timestamps.txt').write_text('1\n2\n3\n')
+    with pytest.raises(RecordingError, match=r'second\.png has no number'):
+        open_recording(tmp_path)
+
+
 def test_boxes_are_written_to_a_thousandth() -> None:
     assert format_box(Box(367.8, 1234.5678, 33.8, 4)) == '367.8,1234.568,33.8,4'
     assert format_box(None) == 'nan,nan,nan,nan'

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -37,6 +37,36 @@ def image_files(folder: Path) -> tuple[Path, ...]:
     if not found:
         raise RecordingError(f'{folder} holds no images (PNG, JPEG or TIFF)')
     return tuple(sorted(found, key=lambda p: natural_key(p.name)))
+
+
+def missing_number(images: Sequence[Path], lines: int) -> Path | None:
+    """The first file that the images' numbering leaves out; None where that cannot be told.
+
+    Args:
+        images: in the order of their numbers.
+        lines: of a text file with a line for each that there should be.
+    """
+    if not images or not all(p.stem.isdecimal() for p in images):
+        return None
+    numbers = [int(p.stem) for p in images]
+    first = images[0]
+    if 1 < numbers[0] == lines - len(images) + 1:  # what is missing is the beginning
+        return first.with_name(f'{1:0{len(first.stem)}d}{first.suffix}')
+    for path, before, after in zip(images, numbers, numbers[1:], strict=False):
+        if after != before + 1:
+            return path.with_name(f'{before + 1:0{len(path.stem)}d}{path.suffix}')
+    return None
+
+
+def unnumbered(images: Sequence[Path]) -> str:
+    """Which file has no number in its name where others have one, so that its place is unknown.
+
+    In words, '' where none is such.
+    """
+    lost = [p for p in images if not any(c.isdecimal() for c in p.stem)]
+    if 0 < len(lost) < len(images):
+        return f'{lost[0]} has no number in its name, as other images there have'
+    return ''
 
 
 def depths_beside(colors: Iterable[Path], folder: Path) -> tuple[Path | None, ...]:

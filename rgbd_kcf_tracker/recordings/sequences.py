@@ -21,6 +21,8 @@ from rgbd_kcf_tracker.recordings.imagefiles import (
     depths_beside,
     even_stamps,
     image_files,
+    missing_number,
+    unnumbered,
 )
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.recording import (
@@ -80,7 +82,7 @@ class SequenceFolder(Closing):
         self._files = ImageFrames(
             colors,
             self._find_depths(colors, options),
-            self._read_stamps(len(colors), options),
+            self._read_stamps(colors, options),
             options.intrinsics or folder_intrinsics(path),
             options.max_pixels,
         )
@@ -162,14 +164,19 @@ class SequenceFolder(Closing):
             self.warnings.append(f'{missing} of {len(depths)} colour images have no depth image')
         return depths
 
-    def _read_stamps(self, count: int, options: ReadOptions) -> tuple[int, ...]:
+    def _read_stamps(self, colors: tuple[Path, ...], options: ReadOptions) -> tuple[int, ...]:
         path = self.path / 'timestamps.txt'
         if not path.exists():
-            return even_stamps(count, options.fps)
+            return even_stamps(len(colors), options.fps)
+        if lost := unnumbered(colors):
+            raise RecordingError(f'{lost}: which line of {path} is its? Number it, or take it out')
         stamps = tuple(read_stamps(path))
-        if len(stamps) != count:
+        if len(stamps) != len(colors):
+            gap = missing_number(colors, len(stamps))
+            hint = f', and {gap} is missing' if gap else ''
             raise RecordingError(
-                f'{path} has {len(stamps)} lines for {count} images: write one per image'
+                f'{path} has {len(stamps)} lines for {len(colors)} images{hint}: '
+                'write one per image'
             )
         back = sum(b <= a for a, b in pairwise(stamps))
         if back:
@@ -181,6 +188,9 @@ class SequenceFolder(Closing):
         if not path.exists():
             return None
         boxes = read_boxes(path)
+        if fault := self._out_of_step(len(boxes)):
+            self.warnings.append(f'{name} is left out, as its lines are of other images: {fault}')
+            return None
         if len(boxes) > len(self):
             self.warnings.append(
                 f'{name} has {len(boxes)} lines for {len(self)} images: the last are left out'
@@ -191,6 +201,16 @@ class SequenceFolder(Closing):
                 'the last images are taken as not annotated'
             )
         return boxes[: len(self)]
+
+    def _out_of_step(self, lines: int) -> str:
+        """Why a line of a text file is not of the image of the same count; '' where it may be."""
+        colors = self._files.colors
+        if lost := unnumbered(colors):
+            return lost
+        gap = missing_number(colors, lines) if lines > len(colors) else None
+        return (
+            f'it has {lines}, there are {len(colors)} images, and {gap} is missing' if gap else ''
+        )
 
 
 def _stream(name: str, paths: Sequence[Path], rate: float | None, role: str) -> StreamInfo:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from rgbd_kcf_tracker.errors import DatasetError, ImageError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.containers import inspect
-from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, missing_number, unnumbered
 from rgbd_kcf_tracker.recordings.images import Refused, metres_from_mm
 
 
@@ -50,11 +49,14 @@ def check_lengths(truth_path: Path, lines: int, images: Sequence[Path], folder: 
     """Refuse annotations that do not go with the images, one line each.
 
     Raises:
-        DatasetError: naming file, line, and the first image that is missing from the numbering.
+        DatasetError: naming file, line, and the first image that is missing from the numbering, or
+            that has no number.
     """
+    if lost := unnumbered(images):
+        raise DatasetError(f'{lost}: which line of {truth_path} is its? Number it, or take it out')
     if lines == len(images):
         return
-    gap = missing_number(images)
+    gap = missing_number(images, lines)
     hint = f'; {gap} is missing' if gap else ''
     if lines > len(images):
         raise DatasetError(
@@ -65,17 +67,6 @@ def check_lengths(truth_path: Path, lines: int, images: Sequence[Path], folder: 
         f'{truth_path}, line {lines}: the file ends here, but {folder} has {len(images)} images'
         f'{hint}: give one line per image'
     )
-
-
-def missing_number(images: Sequence[Path]) -> Path | None:
-    """The first file that a gap in the images' numbering leaves out; None without a gap."""
-    if not images or not all(p.stem.isdigit() for p in images):
-        return None
-    for before, after in itertools.pairwise(images):
-        number = int(before.stem) + 1
-        if int(after.stem) != number:
-            return before.with_name(f'{number:0{len(before.stem)}d}{before.suffix}')
-    return None
 
 
 def shifted(box: Box | None, by: float) -> Box | None:
