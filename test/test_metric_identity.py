@@ -691,8 +691,8 @@ def test_what_is_elsewhere_does_not_draw_the_place_after_it():
 
 
 def test_a_place_that_is_vague_says_little():
-    place, vague = np.array([0.2, 0.0, 2.0]), np.array([0.1, 0.1, 1.0])
-    off = np.array([0.8, 0.0, 0.0])
+    place, vague = np.array([0.2, 0.0, 2.0]), np.array([0.1, 0.1, 0.4])
+    off = np.array([0.5, 0.0, 0.0])
     odds = []
     for sigma in (NARROW, vague):
         thing = Stood(place, sigma, 0.1)
@@ -701,6 +701,16 @@ def test_a_place_that_is_vague_says_little():
         thing.carried(TURNED, 0.1)
         odds.append(thing.log_odds(TURNED.of(place) + off, NARROW))
     assert odds[0] < ELSEWHERE < odds[1]
+
+
+def test_whether_he_stands_of_whom_the_wall_behind_alone_is_read_is_not_known():
+    """Who walked in beside the depth image stood there for good, and was nobody as he came on."""
+    beyond, vague = np.array([2.0, 0.0, 5.0]), np.array([0.3, 0.1, 1.2])
+    comer = Stood(beyond, vague, 0.6)
+    comer.seen(beyond - np.array([0.3, 0.0, 0.0]), vague, 0.1)
+    comer.carried(TURNED, 0.1)
+    assert not comer.known
+    assert comer.log_odds(np.array([1.0, 0.0, 3.0]), NARROW) == 0.0
 
 
 def test_the_longer_a_thing_has_stood_still_the_more_that_says():

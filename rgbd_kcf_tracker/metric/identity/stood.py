@@ -31,6 +31,9 @@ is off by."""
 CARRIED_OFF, SUDDENLY, CARRYING = 0.1, 0.01, 3.0
 """Probability that somebody moves a thing while nobody looks, that it is elsewhere all at once
 between two frames, and the seconds it takes to come over: what is carried off is seen to go."""
+SURELY = 0.5
+"""Metres to which its place must be known to tell a thing that stands from one that moves: less
+than a stride. Of who comes in beside the depth image only the wall behind him is read."""
 GAIN = 1.5
 """Log-odds of what is where it stood: few other things fit there, but what it stood on is there."""
 
@@ -90,7 +93,7 @@ class Stood:
 
         It says nothing before the camera has moved: one that stands still sees what starts to move.
         """
-        return self._carried and self._known
+        return self._carried and self._known and self._vague < SURELY
 
     def log_odds(self, place: FloatArray, sigma: FloatArray) -> float:
         """What a place says for its being the target, 0 where that is not known.
