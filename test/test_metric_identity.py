@@ -1400,6 +1400,18 @@ def test_a_target_that_shows_in_a_gap_between_two_who_are_nearer_is_not_they():
     assert seen.depth == pytest.approx(3.5, abs=0.1)
 
 
+def test_a_cupboard_behind_somebody_who_has_no_reading_is_not_he():
+    one = Someone(0.0, 3.0)
+    color, depth = images([one])
+    b = one.box
+    behind = np.s_[round(b.y) + 10 : round(b.bottom) - 10, round(b.x) : round(b.right)]
+    depth[behind] = np.where(depth[behind] == one.z, np.nan, np.float32(4.6))
+    depth[depth == one.z] = np.nan
+    depth[:, round(b.cx) - 9 : round(b.cx) + 9] = np.nan  # nor do his arms show
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    assert surface_of(Crowd().explain(scene, 0.0), b, MetricParameters()) is None
+
+
 @pytest.mark.parametrize('own', [False, True])
 def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colours(
     own: bool, monkeypatch: pytest.MonkeyPatch
@@ -1439,6 +1451,24 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
     assert (track.box is not None) == (own and pace < 2)
     if track.box is not None:
         assert track.box.iou(one.box) > 0.9
+
+
+def test_a_strip_that_shows_where_somebody_was_followed_by_his_look_is_not_he(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """A piece of the wall, a tenth of his box, was he for the rest of the scene."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    one = Someone(0.0, 2.5)
+    x, y = round(one.box.cx), round(one.box.cy)
+    for i in range(8):
+        color, depth = images([one])
+        depth[depth == one.z] = np.nan
+        if i > 3:
+            depth[y - 22 : y + 22, x - 4 : x + 4] = 4.2
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert track.box is None
 
 
 @pytest.mark.parametrize(('silent', 'found'), [(2, True), (4, False)])

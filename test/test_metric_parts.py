@@ -591,7 +591,7 @@ def test_nothing_is_learned_of_what_is_refused_and_it_is_not_found_again_until_i
         return Frame(image, None, i * 1_000_000_000)
 
     look = ByLook(at(0, patch), box, MetricParameters())
-    before = look.glance(at(0, patch), box, 1.0)
+    before = look.glance(at(0, patch), box, 1.0, goes_on=True)
     found = look.step(at(1, alike), 1.0)
     assert before is not None
     assert found is not None
@@ -669,13 +669,25 @@ def test_a_glance_finds_the_target_and_learns_nothing():
     image, box = blobs(4, 300), Box(120, 110, 50, 70)
     first = Frame(image, None, 0)
     look = ByLook(first, box, MetricParameters())
-    before = look.glance(first, box, 0.03)
+    before = look.glance(first, box, 0.03, goes_on=False)
     assert before is not None
     assert before.box.iou(box) > 0.9
     faded = cv2.addWeighted(image, 0.6, blobs(5, 300), 0.4, 0)
     for i in range(1, 20):
-        assert look.glance(Frame(faded, None, i), box, 0.1) is not None
-    assert look.glance(first, box, 0.03) == before
+        assert look.glance(Frame(faded, None, i), box, 0.1, goes_on=False) is not None
+    assert look.glance(first, box, 0.03, goes_on=False) == before
+
+
+def test_who_is_looked_at_may_turn_round_before_the_eyes_but_not_meanwhile():
+    """He was lost as he turned, a hundredth below what somebody is found again by."""
+    image, box = blobs(4, 300), Box(120, 110, 50, 70)
+    look = ByLook(Frame(image, None, 0), box, MetricParameters())
+    turned = Frame(cv2.addWeighted(image, 0.3, blobs(5, 300), 0.7, 0), None, 1)
+    assert look.glance(turned, box, 0.1, goes_on=False) is None
+    ratio, parameters = look.response, MetricParameters()
+    assert ratio is not None
+    assert parameters.hidden_ratio < ratio < parameters.seen_ratio
+    assert look.glance(turned, box, 0.1, goes_on=True) is not None
 
 
 # -- the verdict ----------------------------------------------------------------------------------

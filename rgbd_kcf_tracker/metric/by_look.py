@@ -239,13 +239,24 @@ class ByLook:
         rate = min(MAX_RATE, SCALE_RATE * seconds / FRAME)
         self._scales.learn(frame.color, self._cx, self._cy, *self._size, rate)
 
-    def glance(self, frame: Frame, box: Box, dt: float) -> Look | None:
-        """Look only about where the target is expected, ``box``; None where it is not seen."""
+    def glance(self, frame: Frame, box: Box, dt: float, goes_on: bool) -> Look | None:
+        """Look only about where the target is expected.
+
+        Args:
+            frame: the frame.
+            box: where.
+            dt: seconds since the last frame.
+            goes_on: whether it was seen in that: it may turn then and look less like itself.
+
+        Returns:
+            None where it is not seen.
+        """
         self._follow_size(frame)
         self._place(box)
         sighting = self._appearance.look(frame.color, self._cx, self._cy, self._scale)
         self.response = sighting.ratio
-        if sighting.ratio < self._parameters.seen_ratio:
+        parameters = self._parameters
+        if sighting.ratio < (parameters.hidden_ratio if goes_on else parameters.seen_ratio):
             return None
         # Nothing bears out that this is the target: it is not learned from.
         return self._found(frame, sighting, dt)

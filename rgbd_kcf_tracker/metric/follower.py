@@ -342,7 +342,7 @@ class Follower:
             # Who was away need not be where he was expected: what is like him may be anything.
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
-                look = self._look.glance(frame, box, dt)
+                look = self._look.glance(frame, box, dt, goes_on=self._hidden_for == 0)
                 stood = 0.0 if look is None else surface.stood_at(view, look.box)
                 if (
                     look is not None

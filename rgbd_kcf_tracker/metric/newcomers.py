@@ -23,6 +23,9 @@ COVERED = 0.6
 """Share of a newcomer's outline that lies in the target's box, at the least: more than half, so
 that it is not he who stands beside it, but not all, as he may have moved on by a part of his
 width."""
+LEAST_SHOWN = 0.2
+"""Times the area of the target's box that a newcomer's outline has, at the least: a head and
+shoulders of somebody in view from head to foot. Less is a strip of the room that was hidden."""
 WALK, WALKED = 1.4, 0.5
 """Metres a second by which that box reaches farther to both sides once the look is lost, and for
 how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
@@ -84,6 +87,7 @@ class Newcomers:
             reach = last if seen.area < WHOLE else _reach(last, scene, seen.depth, unseen)
             if (
                 seen.area < NEWCOMER_AREA
+                or shown.area < LEAST_SHOWN * last.area
                 or shown.intersection(reach) < COVERED * least
                 or shown.iou(last) < likest
             ):
