@@ -267,7 +267,10 @@ class Processor:
         # One pixel in 256 is enough to tell an empty image from a sparse one.
         sample = depth[::16, ::16]
         if not (sample > 0).any() and not (depth > 0).any():
-            self._fault('empty_depth', 'depth image has no reading at all: is the sensor covered?')
+            self._fault(
+                'empty_depth',
+                'depth image has no reading at all: is the sensor covered, or its 32FC1 no metres?',
+            )
         return depth
 
     def _notice(self, header: Any, moment: Instant) -> None:
