@@ -38,8 +38,9 @@ class Track:
         depth: distance of the target along the optical axis in metres; None where unknown.
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
             forward, x right, y down); None where depth or intrinsics are unknown. ``metric`` gives
-            the middle of the body, half its thickness behind the surface that is seen, the thesis's
-            variants the surface at the middle of the box.
+            the middle of the body, half its thickness behind the surface that is seen, and believes
+            its distance without a reading for as long as that of one that is hidden; the thesis's
+            variants give the surface at the middle of the box.
         id: of the target among several; 0 where there is only one.
         velocity: ``(x, y, z)`` over the ground in metres per second in the same frame; None where
             unknown.

@@ -394,6 +394,29 @@ def test_who_has_no_reading_and_turns_round_is_followed_and_not_who_passes_befor
     assert min(shown) > 0.1
 
 
+def test_the_distance_of_who_is_seen_and_not_read_is_believed_as_long_as_that_of_who_is_hidden():
+    """A robot that follows him stood still, as nothing was said of his place."""
+    tracker, last = create_tracker('metric'), 0
+    errors: list[np.ndarray] = []
+    sigmas: list[np.ndarray] = []
+    for moment in simulate('missing_depth', seed=172, rate_hz=10.0):
+        frame = moment.frame
+        track = tracker.update(frame) if last else tracker.start(frame, moment.visible)
+        if track.depth is not None:
+            last = frame.stamp_ns
+        if track.box is None or track.depth is not None:
+            continue
+        ahead = MetricParameters().predict_for - (frame.stamp_ns - last) / 1e9
+        if abs(ahead) > 0.05:
+            assert (track.position is not None) == (ahead > 0)
+        if track.position is not None:
+            errors.append(np.subtract(track.position, moment.truths[1].position))
+            sigmas.append(np.sqrt(np.reshape(track.covariance, (3, 3)).diagonal()))
+    assert len(errors) > 10
+    assert np.abs(errors).max() < 0.2
+    assert (np.diff(sigmas, axis=0)[:, 2] > 0).all(), 'ever less surely'
+
+
 def test_who_comes_out_after_one_who_looks_the_same_is_followed_if_more_alike():
     """The box stayed on the first of them, and nobody was found when he had left."""
     run = follow(simulate('decoy', seed=83, rate_hz=5.0, size=SIZE))

@@ -107,7 +107,7 @@ class Follower:
         self._crowd = crowd
         self._surface: BySurface | None = None
         self._account: Account | None = None
-        self._hidden_for = 0.0
+        self._hidden_for = self._unread_for = 0.0
         self._partial = False
         self._since = crowd.time
         self._elsewhere = Elsewhere()
@@ -175,6 +175,7 @@ class Follower:
             track = self._by_surface(frame, account, view, dt, self._surface)
         self.response = None if self._look is None else self._look.response
         self._hidden_for = 0.0 if track.box is not None else self._hidden_for + dt
+        self._unread_for = 0.0 if track.depth is not None else self._unread_for + dt
         self.track = track
         return track
 
@@ -353,8 +354,12 @@ class Follower:
                     if account is not None and self.person is not None:
                         place = account.scene.axes @ surface.middle
                         self.person.placed(place, account.time)
-                    score = _score(look, stood)
-                    return self._tracked(frame, look.box, score, look.depth, surface.belief())
+                    score, belief = _score(look, stood), surface.belief()
+                    # Where its distance is not read, that is believed for as long as hidden ones'.
+                    unread = 0.0 if look.depth is not None else self._unread_for + dt
+                    if unread > self._parameters.predict_for:
+                        belief = None
+                    return self._tracked(frame, look.box, score, look.depth, belief)
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
@@ -410,7 +415,7 @@ class Follower:
         depth: float | None,
         belief: Belief | None = None,
     ) -> Track:
-        belief = None if depth is None else in_metres(belief, frame)
+        belief = in_metres(belief, frame)
         if belief is None:
             return Track(box, TrackState.TRACKING, score, depth, frame.position(box, depth))
         return Track(

@@ -48,7 +48,8 @@ corner that makes it one, and a pixel by which outlines are off."""
 LEAST_CORNERS = 12
 LEAST_AGREEING = 0.4
 """Corners that must agree on a motion for it to be believed, four times as many equations as it has
-unknowns, and their share of the view: people may fill half of it."""
+unknowns, and their share of all: people may fill half of the view, and where it shows hardly
+anything, noise has corners, too."""
 AGREE = 1.5
 """Pixels of the view within which a corner agrees: flow is good to a part of one, and a corner's
 depth may be that of either side of an edge."""
@@ -388,9 +389,9 @@ def _agreed(
     """
     points = _points(first, view)
     motion = _fitted(points, second, view.intrinsics, turn)
-    agreeing = _lengths(_projected(motion.of(points), view.intrinsics) - second) < AGREE
-    enough = np.count_nonzero(agreeing) >= LEAST_CORNERS
-    return motion if enough and _share(agreeing, first) >= LEAST_AGREEING else None
+    off = _lengths(_projected(motion.of(points), view.intrinsics) - second)
+    agreeing = np.count_nonzero(off < AGREE)
+    return motion if agreeing >= max(LEAST_CORNERS, LEAST_AGREEING * len(points)) else None
 
 
 def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray) -> Pose:
