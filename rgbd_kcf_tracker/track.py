@@ -38,16 +38,16 @@ class Track:
         depth: distance of the target along the optical axis in metres; None where unknown.
         position: ``(x, y, z)`` of the target in metres in the camera's optical frame (REP-103: z
             forward, x right, y down); None where depth or intrinsics are unknown. ``metric`` gives
-            the middle of the body, half its thickness behind the surface that is seen, and believes
-            its distance without a reading for as long as that of one that is hidden; the thesis's
-            variants give the surface at the middle of the box.
+            the middle of the body, half its thickness behind the surface that is seen, the thesis's
+            variants the surface at the middle of the box.
         id: of the target among several; 0 where there is only one.
         velocity: ``(x, y, z)`` over the ground in metres per second in the same frame; None where
             unknown.
         covariance: of the position or the predicted position, ``(3, 3)`` row by row in square
             metres, positive definite; None where unknown.
-        predicted: where the middle of a target that is not seen is believed to be, ``(x, y, z)`` in
-            metres; None while it is seen, and where nothing is known, or not any more.
+        predicted: where the middle of a target that is not seen, or on which depth shows nothing,
+            is believed to be, ``(x, y, z)`` in metres; None with a position, and where nothing is
+            known, or not any more.
         velocity_covariance: ``(3, 3)`` row by row in square metres per square second; None where
             the velocity is.
     """
@@ -62,6 +62,11 @@ class Track:
     covariance: tuple[float, ...] | None = None
     predicted: tuple[float, float, float] | None = None
     velocity_covariance: tuple[float, ...] | None = None
+
+    @property
+    def place(self) -> tuple[float, float, float] | None:
+        """Where the target is, or else is believed to be, as far as that is known."""
+        return self.predicted if self.position is None else self.position
 
     @property
     def occluded(self) -> bool:

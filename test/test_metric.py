@@ -408,9 +408,10 @@ def test_the_distance_of_who_is_seen_and_not_read_is_believed_as_long_as_that_of
             continue
         ahead = MetricParameters().predict_for - (frame.stamp_ns - last) / 1e9
         if abs(ahead) > 0.05:
-            assert (track.position is not None) == (ahead > 0)
-        if track.position is not None:
-            errors.append(np.subtract(track.position, moment.truths[1].position))
+            assert (track.predicted is not None) == (ahead > 0)
+        assert track.position is None, 'nothing is read'
+        if track.predicted is not None:
+            errors.append(np.subtract(track.predicted, moment.truths[1].position))
             sigmas.append(np.sqrt(np.reshape(track.covariance, (3, 3)).diagonal()))
     assert len(errors) > 10
     assert np.abs(errors).max() < 0.2

@@ -72,6 +72,14 @@ def test_hidden_targets_are_predicted_and_age() -> None:
     assert walks.update([broken], 6 * SECOND) == {}
 
 
+def test_who_is_seen_and_not_read_is_predicted_and_does_not_age() -> None:
+    unread = Track(BOX, TrackState.TRACKING, 0.9, None, id=4, predicted=(1.0, 0.0, 3.0))
+    where = Walks().update([unread], SECOND, CAMERA)[4]
+    assert (where.predicted, where.hidden_s, where.size) == (True, 0.0, None)
+    assert where.position == pytest.approx(unread.predicted)
+    assert MAKE.position(HEADER, where) is None
+
+
 def test_a_camera_that_turns_does_not_turn_what_stands() -> None:
     """A base turns left by 10 degrees a frame while somebody stops."""
     walks = Walks()

@@ -354,12 +354,11 @@ class Follower:
                     if account is not None and self.person is not None:
                         place = account.scene.axes @ surface.middle
                         self.person.placed(place, account.time)
-                    score, belief = _score(look, stood), surface.belief()
-                    # Where its distance is not read, that is believed for as long as hidden ones'.
+                    # What is not read is believed for as long as where who is hidden is.
                     unread = 0.0 if look.depth is not None else self._unread_for + dt
-                    if unread > self._parameters.predict_for:
-                        belief = None
-                    return self._tracked(frame, look.box, score, look.depth, belief)
+                    known = unread <= self._parameters.predict_for
+                    belief = surface.belief() if known else None
+                    return self._tracked(frame, look.box, _score(look, stood), look.depth, belief)
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
@@ -418,14 +417,16 @@ class Follower:
         belief = in_metres(belief, frame)
         if belief is None:
             return Track(box, TrackState.TRACKING, score, depth, frame.position(box, depth))
+        place = triple(belief.position)
         return Track(
             box,
             TrackState.TRACKING,
             score,
             depth,
-            triple(belief.position),
+            None if depth is None else place,
             velocity=triple(belief.velocity),
             covariance=row_by_row(belief.covariance),
+            predicted=place if depth is None else None,
             velocity_covariance=row_by_row(belief.velocity_covariance),
         )
 

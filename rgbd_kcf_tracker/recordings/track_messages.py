@@ -158,7 +158,7 @@ class TrackMessages:
     # -- in space ---------------------------------------------------------------------------------
 
     def position(self, header: Any, where: Whereabouts | None) -> Any | None:
-        """``geometry_msgs/PointStamped`` in metres; None while the target is not seen."""
+        """``geometry_msgs/PointStamped`` in metres; None where the target is not read."""
         if where is None or where.predicted:
             return None
         return self._make(
@@ -352,8 +352,7 @@ def _values(track: Track) -> Iterator[tuple[str, str]]:
     if track.box is not None:
         for name, value in zip(BOX_KEYS, track.box.as_tuple(), strict=True):
             yield name, f'{value:.3f}'
-    place = track.predicted if track.box is None else track.position
-    if place is not None:
-        for name, metres in zip(POSITION_KEYS, place, strict=True):
+    if track.place is not None:
+        for name, metres in zip(POSITION_KEYS, track.place, strict=True):
             yield name, f'{metres:.3f}'
-        yield PREDICTED_KEY, 'true' if track.box is None else 'false'
+        yield PREDICTED_KEY, 'true' if track.position is None else 'false'

@@ -49,7 +49,7 @@ class Whereabouts:
         velocity: ``(3,)`` metres per second; None where unknown.
         covariance, velocity_covariance: ``(3, 3)``; None where unknown.
         size: ``(3,)`` metres of the box along the camera's x, y and z axes; None while it is hidden
-            or the camera's intrinsics are unknown.
+            or not read, or the camera's intrinsics are unknown.
         camera: the camera's pose in the frame.
         trail: ``(n, 3)`` metres, where it was within the last seconds, oldest first.
     """
@@ -156,7 +156,7 @@ class Walks:
 def _where(
     track: Track, walk: _Walk, stamp_ns: int, intrinsics: Intrinsics | None, pose: Pose | None
 ) -> Whereabouts | None:
-    place = track.predicted if track.box is None else track.position
+    place = track.place
     if place is None or not np.isfinite(place).all():
         return None
     position = np.array(place, np.float64)
@@ -180,7 +180,7 @@ def _where(
     return Whereabouts(
         track=track,
         position=position,
-        predicted=track.box is None,
+        predicted=track.position is None,
         hidden_s=hidden_s,
         forward=_level(away, up),
         up=up,

@@ -68,7 +68,7 @@ def place_of(
     track: Track, position: Triple | None, velocity: Triple | None, astray: bool = False
 ) -> Place | None:
     """A track against the truth; None where it said no place with a covariance, or none is true."""
-    told = track.position if track.box is not None else track.predicted
+    told = track.place
     if position is None or told is None or track.covariance is None:
         return None
     distance, error = _distance(told, position, track.covariance)
