@@ -46,7 +46,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
 )
 from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
-from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, Followed, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
@@ -1212,7 +1212,7 @@ def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen,
     if stacked:
         alike = np.stack([similarity(view, Looks.of(stacked)) for view in views], axis=1)
     watch = MixUps()
-    found = [watch.watch(here, alike, 10.0 + 0.1 * i) for i in range(8)]
+    found = [watch.watch(here, [], alike, 10.0 + 0.1 * i) for i in range(8)]
     assert found[0] is None, 'one sighting is too little'
     assert any(found) == mixed_up
     if mixed_up:
@@ -1252,8 +1252,42 @@ def test_two_who_never_came_so_near_that_places_could_mislead_are_not_exchanged(
     for time in np.arange(10.0, 11.0, 0.1):
         for one in here:
             one.person.moved_to(one.place, time - 0.1)
-        found.append(watch.watch(here, alike, time))
+        found.append(watch.watch(here, [], alike, time))
     assert any(found) == mixed_up
+
+
+@pytest.mark.parametrize(
+    ('looks', 'hidden', 'gone', 'found'),
+    [
+        (GREEN, GREEN, 2.0, True),
+        (RED, GREEN, 2.0, False),  # he is still the one
+        (BLUE, GREEN, 2.0, False),  # turned round
+        (RED, RED, 2.0, False),  # twins
+        (GREEN, GREEN, 2.0 * HIDDEN_FOR, False),
+    ],
+)
+@pytest.mark.parametrize('chosen', [False, True])
+def test_who_came_out_beside_another_and_has_his_number_is_who_was_hidden(
+    looks, hidden, gone, found, chosen
+):
+    """In a group one came out behind another who was hidden then, and was he from then on."""
+    views = look(looks, looks), look(GREY, GREY)
+    known = look(RED, RED), look(GREY, GREY), look(hidden, hidden)
+    here = [met(n, (0.5 * n, 3.0), views[n], known[n], n) for n in range(2)]
+    other = Person(2, np.array([0.0, 3.5]), 0.0, chosen)
+    other.gallery.learn(known[2], 0.0)
+    alike = np.stack([similarity(view, Looks.of(list(known))) for view in views], axis=1)
+    watch = MixUps()
+    times = [10.0 + 0.1 * i for i in range(8)]
+    other.seen_at = times[0] - gone
+    said = [watch.watch(here, [Missing(other, slice(2, 3))], alike, time) for time in times]
+    assert said[0] is None, 'one sighting is too little'
+    if not found:
+        assert not any(said)
+        return
+    first = next(each for each in said if each is not None)
+    # Who was chosen is recognised by who follows him: there stands somebody new.
+    assert first == (here[0].person, None if chosen else other, other.seen_at)
 
 
 @pytest.mark.parametrize('lost', [True, False])
@@ -1333,6 +1367,33 @@ def test_a_figure_that_lies_in_the_box_is_the_target_though_limbs_are_missing(le
     drawn = Box(x + left * width, y, wide * width, height)
     assert one.box.iou(drawn) < 0.5
     assert (surface_of(account, drawn, MetricParameters()) is not None) == taken
+
+
+@pytest.mark.parametrize('shows', [True, False])
+def test_who_is_half_hidden_is_chosen_by_the_box_about_what_shows_of_him(shows: bool):
+    """Who is nearer fills more of the box and overlaps it by half, but sticks out of it."""
+    nearer = Someone(0.0, 2.6)
+    color, depth = images([nearer])
+    b = nearer.box
+    drawn = Box(b.x - 12, b.y + 5, b.width + 16, 0.75 * b.height)
+    assert drawn.iou(b) > 0.5
+    if shows:
+        part = depth[round(drawn.y) : round(drawn.bottom), round(drawn.x) : round(drawn.right)]
+        part[part == WALL] = 3.2
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters())
+    assert seen is not None
+    assert seen.depth == pytest.approx(3.2 if shows else nearer.z, abs=0.05)
+
+
+@pytest.mark.parametrize('shows', [0.35, 0.1])
+def test_where_the_depth_image_ends_the_rest_of_the_box_tells_what_it_is_about(shows):
+    one = Someone(0.0, 3.0)
+    color, depth = images([one])
+    depth[:, : round(one.box.right - shows * one.box.width)] = np.nan
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), one.box, MetricParameters())
+    assert (seen is not None) == (shows == 0.35)
 
 
 def test_what_sticks_out_of_the_given_box_is_not_the_target():

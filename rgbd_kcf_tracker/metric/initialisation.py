@@ -17,7 +17,9 @@ from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
+from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE
+from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 LOCK_IOU = 0.5
@@ -31,10 +33,23 @@ PART_IOU, INSIDE = 0.35, 0.9
 LEAST_FILL = 0.5
 """Share of the given box that a surface fills of which the box shows only a part: the greater part
 of it, or the box is about something else."""
-SCATTERED, OWN, THICK = 0.06, 0.7, 0.4
-"""Share of the given box that the scattered readings of a target fill, at the least; share of a
-piece that lies in the box from which it is the target's; and metres between the target's readings,
-arms and a far reading's noise included."""
+SCATTERED, THICK = 0.06, 0.4
+"""Share of the given box that the scattered readings of a target fill, at the least; and metres
+between the target's readings, arms and a far reading's noise included."""
+OWN, MOST_DEPTHS = 0.7, 4
+"""Share of a piece that lies in the box from which it may be the target's, as outlines in depth and
+in colour differ; and at how many pieces' depths it is looked for, the largest first: who is half
+hidden is cut into two or three."""
+NOISE = 3
+"""Pixels of a piece from which it counts: of fewer, single readings, any noise makes some."""
+LEAST_BESIDE = 0.25
+"""How much of who is half hidden a box shows at the least, against the largest that it shows of
+anything no larger than a person: of less there is more between somebody's arms and legs."""
+LEAST_TOLD = 0.25
+"""Share of the given box's columns that depth reaches from which these tell what it is about: a leg
+and an arm of who stands where the depth image ends."""
+MOSTLY = 0.5
+"""Share of the box's middle without a reading from which it is that of a target without any."""
 CENTRED = 0.125
 """Share of the target's scattered readings in the middle quarter of the box, at the least: half of
 what lies there of readings all over it. Of real and simulated starts 0.19 to 0.52 do."""
@@ -47,21 +62,26 @@ else who touches the target, or what it stands on."""
 def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silhouette | None:
     """The figure or surface that a box of the image is drawn about, None where none fits."""
     scene = account.scene
+    told = _told(scene, box)
     whole = whole_of(account, box)
+    behind = _pieces_in(scene, told, 0.0 if whole is None else _fit(box_about(scene, whole), told))
+    if behind is not None and whole is not None:
+        return behind
     if whole is not None:
         return _within(scene, whole, box)
-    piece = _piece_of(scene, box)
+    piece = _piece_of(scene, told)
     if piece is not None and _found_again(account, piece, parameters):
         return piece
-    return _scattered(scene, box)
+    return behind or _scattered(scene, told)
 
 
 def whole_of(account: Account, box: Box) -> Silhouette | None:
     """The figure or surface as large as a box, with what of it lies beside the box as well."""
+    scene = account.scene
+    box = _told(scene, box)
     figure = _figure_of(account, box)
     if figure is not None:
         return figure
-    scene = account.scene
     rows, cols = scene.view.shape
     b = box.over(scene.view.step).clipped(cols, rows)
     if b is None:
@@ -76,6 +96,80 @@ def whole_of(account: Account, box: Box) -> Silhouette | None:
     iou *= _shown(scene, box) > 0
     label = int(np.argmax(iou))
     return scene.silhouette(label) if iou[label] >= LOCK_IOU else None
+
+
+def _told(scene: Scene, box: Box) -> Box:
+    """A box without the columns that depth does not reach; as it is where hardly any others are."""
+    step = scene.view.step
+    left = max(box.x, scene.rim.left * step)
+    right = min(box.right, (scene.view.shape[1] - scene.rim.right) * step)
+    if right - left < LEAST_TOLD * box.width:
+        return box
+    return Box.from_corners(left, box.y, right, box.bottom)
+
+
+def _fit(outline: Box, box: Box) -> float:
+    """How well an outline is what a box is drawn about, 0 to 1.
+
+    What sticks out of the box counts twice: parts of a target may be hidden or have no reading, but
+    nobody draws a box through the middle of it.
+    """
+    common = outline.intersection(box)
+    return (common / outline.area) ** 2 * (common / box.area)
+
+
+def _pieces_in(scene: Scene, box: Box, least: float) -> Silhouette | None:
+    """The pieces of one depth that lie in a box and fit it best: somebody who is half hidden.
+
+    Args:
+        scene: of now.
+        box: the box.
+        least: how well they must fit it, see :func:`_fit`.
+    """
+    surfaces, sizes = scene.surfaces, scene.sizes
+    shown = _shown(scene, box)
+    whole = (shown > OWN * surfaces.pixels) & (shown >= NOISE)
+    whole[0] = False
+    small = ~larger_than_anybody(sizes)
+    small[0] = False
+    enough = max(SCATTERED * shown.sum(), LEAST_BESIDE * shown[small].max(initial=0))
+    best = None
+    labels = np.flatnonzero(whole)
+    for label in labels[np.argsort(-shown[labels])[:MOST_DEPTHS]].tolist():
+        z = float(surfaces.depth[label])
+        pieces = whole & (np.abs(surfaces.depth - z) < DEPTH_STEP + DEPTH_STEP_PER_METRE * z)
+        if shown[pieces].sum() < enough:
+            continue
+        boxes = surfaces.boxes[pieces]
+        left, top = boxes[:, :2].min(axis=0).tolist()
+        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0).tolist()
+        mask = pieces[surfaces.labels[top:bottom, left:right]]
+        seen = Silhouette.trimmed(scene.view, left, top, mask, scene.rim)
+        if seen is None or seen.width * seen.height < SMALL:
+            continue
+        outline = box_about(scene, seen)
+        fit = _fit(outline, box)
+        if fit > least and _overlaps(outline, box) and not _of_background(scene, seen, box):
+            best, least = _within(scene, seen, box), fit
+    return best
+
+
+def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
+    """Whether the middle of a box shows that a silhouette is of what is behind the target.
+
+    Mostly it has no reading there then, and next to nothing of the silhouette, or shows more of
+    something large before it: the target may be a part of that, as who touches a wall.
+    """
+    down, across = box.height / 4, box.width / 4
+    inner = Box(box.x + across, box.y + down, 2 * across, 2 * down).over(scene.view.step)
+    middle = part_in(scene.view.shape, inner)
+    depth = scene.view.depth[middle]
+    own = np.count_nonzero(seen.in_view(scene.view.shape)[middle])
+    if np.count_nonzero(depth == 0) > MOSTLY * depth.size:
+        return bool(own < CENTRED * np.count_nonzero(seen.mask))
+    nearer = scene.standing[middle] & (depth < seen.depth - DEPTH_STEP)
+    nearer &= larger_than_anybody(scene.sizes)[scene.surfaces.labels[middle]]
+    return bool(np.count_nonzero(nearer) > own)
 
 
 def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
@@ -125,10 +219,14 @@ def _figure_of(account: Account, box: Box) -> Silhouette | None:
     if not figures:
         return None
     outlines = [box_about(account.scene, seen) for seen in figures]
-    overlaps = [outline.iou(box) for outline in outlines]
-    best = int(np.argmax(overlaps))
-    inside = box.intersection(outlines[best]) > INSIDE * outlines[best].area
-    return figures[best] if overlaps[best] >= (PART_IOU if inside else LOCK_IOU) else None
+    best = int(np.argmax([outline.iou(box) for outline in outlines]))
+    return figures[best] if _overlaps(outlines[best], box) else None
+
+
+def _overlaps(outline: Box, box: Box) -> bool:
+    """Whether an outline may be what a box is drawn about, of which limbs may be missing."""
+    inside = box.intersection(outline) > INSIDE * outline.area
+    return outline.iou(box) >= (PART_IOU if inside else LOCK_IOU)
 
 
 def _scattered(scene: Scene, box: Box) -> Silhouette | None:
@@ -146,7 +244,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     labels = scene.surfaces.labels[part]
     inside = np.bincount(labels[mine], minlength=len(scene.surfaces))
     inside[0] = scene.surfaces.pixels[0]  # pieces too small to be surfaces
-    mine &= (inside > OWN * scene.surfaces.pixels)[labels]
+    mine &= (inside > INSIDE * scene.surfaces.pixels)[labels]
     depth = scene.view.depth[part]
     if not mine.any():
         return None

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.decide.account import (
 from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
-from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import View
@@ -47,6 +47,9 @@ those who sit are left out."""
 BESIDE = 0.5
 """Metres between two who are surely two, and not a person and a piece of the same: about a
 shoulder's breadth, as no piece of somebody lies farther from his middle."""
+TOGETHER = 0.15
+"""Metres between the middles of two sights that are pieces of one person: less than any chest is
+thick, so that no two stand as near."""
 STRIP = 0.15
 """Metres of a figure beside the part of it that was chosen from which that is somebody else, where
 it is taller than any limb: boxes are not drawn as narrow."""
@@ -172,7 +175,7 @@ class Crowd:
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
         account, alike = self._explained(scene, sights, time)
-        mixed_up = self._mix_ups.watch(self._followed(account), alike, time)
+        mixed_up = self._mix_ups.watch(*_followed(account), alike, time)
         if mixed_up is not None:
             other = mixed_up.second
             if other is None:
@@ -219,21 +222,6 @@ class Crowd:
                     odds_of_here[met, column] = NEW - 1
             account.owner = assigned(odds_of_here, len(sights))
         return account, alike
-
-    def _followed(self, account: Account) -> list[Followed]:
-        """Those in view who are known, for :class:`MixUps`."""
-        ends = np.cumsum([len(person.gallery.views) for person in account.people]).tolist()
-        return [
-            Followed(
-                account.people[row],
-                account.sights[column].figure.place,
-                account.sights[column].view,
-                column,
-                slice(ends[row] - len(account.people[row].gallery.views), ends[row]),
-            )
-            for column, row in enumerate(account.owner)
-            if row >= 0
-        ]
 
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
@@ -288,7 +276,8 @@ class Crowd:
             if row == HELD:
                 account.owner[column] = -1
             elif row < 0:
-                if sight.figure.seen.area < NEW_AREA and not _is_head(account, column):
+                small = sight.figure.seen.area < NEW_AREA and not _is_head(account, column)
+                if small or _is_piece(account, column):
                     continue
                 account.owner[column] = len(people)
                 newcomer = self.welcome(sight.figure.place, time)
@@ -395,6 +384,32 @@ class Crowd:
         learn_sighting(account, row, seen, index, sure)
 
 
+def _followed(account: Account) -> tuple[list[Followed], list[Missing]]:
+    """Those in view who are known, and those who are not in view, for :class:`MixUps`."""
+    ends = np.cumsum([len(person.gallery.views) for person in account.people]).tolist()
+    views = [
+        slice(end - len(person.gallery.views), end)
+        for end, person in zip(ends, account.people, strict=True)
+    ]
+    here = [
+        Followed(
+            account.people[row],
+            account.sights[column].figure.place,
+            account.sights[column].view,
+            column,
+            views[row],
+        )
+        for column, row in enumerate(account.owner)
+        if row >= 0
+    ]
+    gone = [
+        Missing(person, views[row])
+        for row, person in enumerate(account.people)
+        if row not in account.owner and person.alive and person.gallery.views
+    ]
+    return here, gone
+
+
 def _is_head(account: Account, column: int) -> bool:
     """Whether a sight that is small reaches up to where heads are, apart from all others."""
     figure = account.sights[column].figure
@@ -403,6 +418,15 @@ def _is_head(account: Account, column: int) -> bool:
     others = (s.figure.place for n, s in enumerate(account.sights) if n != column)
     apart = all(np.hypot(*(figure.place - place)) > BESIDE for place in others)
     return account.settled and not figure.parted and apart
+
+
+def _is_piece(account: Account, column: int) -> bool:
+    """Whether a sight is where somebody else's is: a piece of him that has just come into view."""
+    place = account.sights[column].figure.place
+    return any(
+        row >= 0 and np.hypot(*(place - other.figure.place)) < TOGETHER
+        for row, other in zip(account.owner, account.sights, strict=True)
+    )
 
 
 def _beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:

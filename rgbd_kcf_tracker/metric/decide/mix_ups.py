@@ -4,9 +4,9 @@
 """Numbers that may have gone over to somebody else, and how that shows.
 
 Where two pass each other, one hides the other or both are one figure, and places say little of who
-is who; nor do they where somebody comes into view just where another was lost. Afterwards places
-say much, and each is followed as whoever he was taken for. Only the looks tell, over some sightings
-and by what was known before.
+is who; nor do they where somebody comes into view just where another was lost, or comes out beside
+another who is hidden now himself. Afterwards places say much, and each is followed as whoever he
+was taken for. Only the looks tell, over some sightings and by what was known before.
 """
 
 from __future__ import annotations
@@ -39,9 +39,12 @@ MIXED_UP = 2.0
 """Log-odds (seven to one) from which two were taken for one another, as for a newcomer who is
 somebody known, beyond what their places said against it while they were near. At 3 one of twins was
 lost for a sixth of its scene, and everyone's returns fell from 86.3 to 84.7 % (docs/metric.md)."""
-NONE_OF_THEM = 3.0
-"""Log-odds (20 to 1) from which who came back is none of those who are known: another side or
-another light may show of him."""
+ANOTHER = 3.0
+"""Log-odds (20 to 1) from which who came back is none of those who are known, and who goes on where
+somebody was is one who is hidden: another side or another light may show of him."""
+HIDDEN_FOR = 10.0
+"""Seconds for which who was lost may come out under another's number: people stand together for as
+long."""
 SIGHTINGS = 2.5
 """Sightings, counted by how much showed, that must say so: each is where he was expected."""
 SIGHTING = 0.1
@@ -66,10 +69,23 @@ class Followed(NamedTuple):
     views: slice
 
 
+class Missing(NamedTuple):
+    """Somebody who is not in view.
+
+    Attributes:
+        person: who.
+        views: where the views of his gallery are among those of all.
+    """
+
+    person: Person
+    views: slice
+
+
 class MixUp(NamedTuple):
     """Two who were taken for one another, and since when that may be, in seconds.
 
-    ``second`` is None where somebody new was taken for ``first``.
+    ``second`` is None where somebody new was taken for ``first``, or somebody chosen, who is
+    recognised by who follows him.
     """
 
     first: Person
@@ -100,13 +116,17 @@ class MixUps:
     def __init__(self) -> None:
         self._meetings: dict[tuple[int, int], _Doubt] = {}
         self._returns: dict[int, _Doubt] = {}
+        self._hidden: dict[tuple[int, int], _Doubt] = {}
         self._time, self._counts = 0.0, 1.0
 
-    def watch(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
+    def watch(
+        self, here: Sequence[Followed], gone: Sequence[Missing], alike: Likeness, time: float
+    ) -> MixUp | None:
         """Take the next frame.
 
         Args:
             here: all in view, before this sight is learned.
+            gone: those who are not, and of whom a view is known.
             alike: ``(v, n)`` likeness of each of ``n`` sights to each of the ``v`` known views.
             time: seconds.
 
@@ -116,7 +136,11 @@ class MixUps:
         self._meetings = {k: d for k, d in self._meetings.items() if time - d.last < AFTER}
         self._returns = {k: d for k, d in self._returns.items() if time - d.last < AFTER}
         self._counts = min(1.0, (time - self._time) / SIGHTING)
-        found = self._returned(here, alike, time) or self._met(here, alike, time)
+        found = (
+            self._returned(here, alike, time)
+            or self._met(here, alike, time)
+            or self._came_out(here, gone, alike, time)
+        )
         self._time = time
         return found
 
@@ -137,7 +161,7 @@ class MixUps:
             if odds is None:
                 continue
             doubt.said.add(-odds, self._counts * one.view.shows, time)
-            if found is None and doubt.said.odds(SIGHTINGS) > NONE_OF_THEM:
+            if found is None and doubt.said.odds(SIGHTINGS) > ANOTHER:
                 found = MixUp(one.person, None, doubt.since)
                 del self._returns[number]
         return found
@@ -167,6 +191,34 @@ class MixUps:
                 if found is None and doubt.said.odds(SIGHTINGS) > MIXED_UP + doubt.against:
                     found = MixUp(one.person, other.person, doubt.since)
                     del self._meetings[key]
+        return found
+
+    def _came_out(
+        self, here: Sequence[Followed], gone: Sequence[Missing], alike: Likeness, time: float
+    ) -> MixUp | None:
+        """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
+        near = {number for pair in self._meetings for number in pair}
+        hidden = [each for each in gone if time - each.person.seen_at < HIDDEN_FOR]
+        doubts: dict[tuple[int, int], _Doubt] = {}
+        found = None
+        for one in here:
+            for other in hidden if one.person.number in near else ():
+                since = other.person.seen_at
+                if other.person.out_of_reach(one.place, time):
+                    continue
+                likeness = alike[:, one.column]
+                taken = one.person.gallery.log_odds_before(since, one.view, likeness[one.views])
+                if taken is None:
+                    continue
+                odds = other.person.gallery.log_odds(one.view, float(likeness[other.views].max()))
+                key = one.person.number, other.person.number
+                doubt = doubts[key] = self._hidden.get(key) or _Doubt(since, time)
+                doubt.said.add(min(odds, odds - taken), self._counts * one.view.shows, time)
+                if found is None and doubt.said.odds(SIGHTINGS) > ANOTHER:
+                    second = None if other.person.chosen else other.person
+                    found = MixUp(one.person, second, since)
+                    del doubts[key]
+        self._hidden = doubts
         return found
 
 

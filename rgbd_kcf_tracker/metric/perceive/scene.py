@@ -183,7 +183,7 @@ class SceneReader:
                 people = upright_people(
                     view, surfaces, elevation, forward, axes[0], self._rim, whole=True
                 )
-                large = _large(Sizes.of(surfaces, view.intrinsics))
+                large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
                 going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
                 opened = (people.mask | going_on.somebody) & unknown
                 opened |= self.room.passing(people.tall, view.depth, surfaces)
@@ -239,7 +239,9 @@ class SceneReader:
             scene: the scene.
         """
         mask = seen.in_view(scene.view.shape)
-        return self.room.goes_on(mask, scene.view.depth, scene.surfaces, _large(scene.sizes))
+        return self.room.goes_on(
+            mask, scene.view.depth, scene.surfaces, larger_than_anybody(scene.sizes)
+        )
 
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None, seconds: float
@@ -271,8 +273,8 @@ def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim, large: npt.NDArray[n
     return mask
 
 
-def _large(sizes: Sizes) -> npt.NDArray[np.bool_]:
-    """Which surfaces are larger than anybody, ``(n,)`` bool."""
+def larger_than_anybody(sizes: Sizes) -> npt.NDArray[np.bool_]:
+    """Which surfaces are, ``(n,)`` bool."""
     large: npt.NDArray[np.bool_] = (sizes.width > WIDTH[1]) | (sizes.height > HEIGHT[1])
     return large
 
