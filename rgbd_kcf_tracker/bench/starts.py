@@ -1,0 +1,118 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a box drawn about who is half hidden starts on them, or on who is nearer.
+
+    python -m rgbd_kcf_tracker.bench.starts people/*_13[1-6]/ --every 12
+
+draws the box of what shows of everybody into every twelfth frame of simulated recordings, each time
+as the first that the tracker sees, and holds the depth of what it takes for the target against that
+of the person. Where depth tells nothing the look is followed: that is no error yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
+from rgbd_kcf_tracker.evaluation.datasets import everyone
+from rgbd_kcf_tracker.evaluation.datasets.folder import read_fractions
+from rgbd_kcf_tracker.evaluation.table import Cell, Table
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.targets import MetricTargets
+from rgbd_kcf_tracker.recordings.mot import MOT_FILE, read_mot
+
+BODY, NOISE_PER_METRE = 0.35, 0.02
+"""Metres in depth between a person's middle and what shows of them, and by how much that grows with
+each metre of distance."""
+SHARES = (0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.01)
+"""Visible shares between which starts are counted together."""
+COLUMNS = ('visible share', 'starts', 'by look alone, %', 'on who is nearer, %', 'farther, %')
+
+
+class Start(NamedTuple):
+    """One start: how much of the person shows, their distance and that of what was taken.
+
+    In metres; ``taken`` is NaN where depth told nothing.
+    """
+
+    share: float
+    distance: float
+    taken: float
+
+
+def starts(folder: Path, every: int) -> Iterator[Start]:
+    """All starts in a recording.
+
+    Raises:
+        RgbdKcfError: where it cannot be read, or does not say how far off anybody is.
+    """
+    frames, _ = everyone.read(folder, 30.0)
+    truth = read_mot(folder / MOT_FILE, len(frames))
+    if not np.isfinite(truth.positions[:, 2]).any():
+        raise DatasetError(f'{folder / MOT_FILE} does not say how far off anybody is')
+    shares = {
+        who: read_fractions(folder / f'visible_{who}.txt') for who in np.unique(truth.ids).tolist()
+    }
+    for who, known in shares.items():
+        if len(known) < len(frames):
+            raise DatasetError(
+                f'{folder}: visible_{who}.txt has {len(known)} of {len(frames)} lines'
+            )
+    for number in range(every // 2, len(frames), every):
+        frame = frames.frame(number)
+        for at in np.flatnonzero((truth.frames == number) & (truth.scores > 0)).tolist():
+            targets = MetricTargets(MetricParameters())
+            taken = targets.started(targets.add(frame, truth.box(at))).depth
+            share = shares[int(truth.ids[at])][number]
+            distance = float(truth.positions[at, 2])
+            yield Start(share, distance, np.nan if taken is None else taken)
+
+
+def row(label: str, found: Sequence[Start]) -> tuple[Cell, ...]:
+    """A row of the table."""
+    distance, taken = (np.array([s[n] for s in found]) for n in (1, 2))
+    off = taken - distance
+    far = BODY + NOISE_PER_METRE * distance
+    shares = (float(100 * each.mean()) for each in (np.isnan(taken), off < -far, off > far))
+    return (label, len(found), *shares)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure and print a table; status 2 where a recording cannot be read."""
+    parser = argparse.ArgumentParser(
+        prog='python -m rgbd_kcf_tracker.bench.starts',
+        description=(__doc__ or '').split('\n')[0],
+    )
+    parser.add_argument(
+        'folders', nargs='+', type=Path, metavar='FOLDER', help='simulated, of several people'
+    )
+    parser.add_argument('--every', type=int, default=12, help='frames from one start to the next')
+    args = parser.parse_args(argv)
+    if args.every < 1:
+        parser.error('--every must be 1 or more')
+    try:
+        found = [start for folder in args.folders for start in starts(folder, args.every)]
+    except RgbdKcfError as error:
+        print(error, file=sys.stderr)
+        return 2
+    bands = [
+        (low, high, [start for start in found if low <= start.share < high])
+        for low, high in itertools.pairwise(SHARES)
+    ]
+    rows = [row(f'{low:.1f} to {min(high, 1.0):.1f}', some) for low, high, some in bands if some]
+    if found:
+        rows.append(row('all', found))
+    print(Table('starts', 'Who a drawn box starts on', COLUMNS, tuple(rows)).text())
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,66 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a box drawn about who is half hidden starts on them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rgbd_kcf_tracker.bench import starts
+from rgbd_kcf_tracker.cli.main import main
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('starts') / 'group'
+    scene = ['--scenario', 'group_crossing', '--seed', '301', '--rate', '5', '--duration', '5']
+    size = ['--size', '320x240', '--color-format', 'jpg']
+    assert main(['simulate', str(folder), *scene, *size]) == 0
+    return folder
+
+
+def test_everybody_in_every_nth_frame_is_started_on(recording: Path):
+    found = list(starts.starts(recording, 4))
+    assert len(found) > 10
+    for start in found:
+        assert 0 < start.share <= 1
+        assert 0.5 < start.distance < 8
+    right = [abs(s.taken - s.distance) < starts.BODY for s in found if s.share > 0.9]
+    assert sum(right) > 0.8 * len(right) > 0
+
+
+def test_starts_are_counted_by_what_they_are_on():
+    one = starts.Start(0.5, 3.0, 3.1)
+    found = [one, one, starts.Start(0.5, 3.0, 2.2), starts.Start(0.5, 3.0, float('nan'))]
+    found.append(starts.Start(0.5, 3.0, 4.0))
+    assert starts.row('half', found) == ('half', 5, 20.0, 20.0, 20.0)
+
+
+def test_a_folder_that_does_not_say_who_is_how_far_off_is_refused_by_name(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    assert starts.main([str(tmp_path)]) == 2
+    assert str(tmp_path) in capsys.readouterr().err
+    away = tmp_path / 'away'
+    away.mkdir()
+    for part in ('rgb', 'depth'):
+        (away / part).symlink_to(recording / part)
+    lines = (recording / 'mot.txt').read_text().splitlines()
+    unknown = [','.join([*line.split(',')[:7], '-1', '-1', '-1']) for line in lines]
+    (away / 'mot.txt').write_text('\n'.join(unknown) + '\n')
+    assert starts.main([str(away)]) == 2
+    error = capsys.readouterr().err
+    assert str(away) in error
+    assert 'how far' in error
+
+
+def test_the_command_prints_a_row_for_each_share(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+):
+    assert starts.main([str(recording), '--every', '12']) == 0
+    said = capsys.readouterr().out
+    assert '0.9 to 1.0' in said
+    assert 'all' in said
