@@ -1493,6 +1493,26 @@ def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colou
         assert track.box.iou(one.box) > 0.9
 
 
+@pytest.mark.parametrize('near', [False, True])
+def test_who_comes_in_far_larger_than_who_was_chosen_passes_before_the_target(
+    near: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """A passer at a metre, in colours like the target's at four, was the target at 0.99."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    chosen = Someone(-2.3, 4.4)
+    for i in range(8):
+        z = 1.6 if near else 4.4
+        one = chosen if i == 0 else Someone((20.0 * i - 120.0) * z / CAMERA.fx, z)
+        color, depth = images([one])
+        depth[:, :30] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, chosen.box) if i == 0 else tracker.update(frame)
+        if track.box is not None and i:
+            break
+    assert (track.box is None) == near
+
+
 @pytest.mark.parametrize(('pace', 'own'), [(1.2, True), (1.2, False), (5.0, True)])
 def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
     pace: float, own: bool, monkeypatch: pytest.MonkeyPatch

@@ -9,6 +9,8 @@ depth often begins some way inside of the image.
 
 from __future__ import annotations
 
+import math
+
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.account import Account
@@ -26,6 +28,10 @@ width."""
 LEAST_SHOWN = 0.2
 """Times the area of the target's box that a newcomer's outline has, at the least: a head and
 shoulders of somebody in view from head to foot. Less is a strip of the room that was hidden."""
+MOST_TALLER = 2.0
+"""Times the height of the target's box, where neither end of that is the image's, that a newcomer's
+outline has at the most: what hid half of somebody may have gone. Who is larger is nearer, and
+passes before the target."""
 WALK, WALKED = 1.4, 0.5
 """Metres a second by which that box reaches farther to both sides once the look is lost, and for
 how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
@@ -65,6 +71,8 @@ class Newcomers:
             unseen: seconds since it was last found.
         """
         best, likest, last = None, 0.0, look.last_box
+        cut = _ends(last, account.scene)
+        tallest = math.inf if cut.top or cut.bottom else MOST_TALLER * last.height
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
             person = account.people[row] if row >= 0 else None
@@ -88,6 +96,7 @@ class Newcomers:
             if (
                 seen.area < NEWCOMER_AREA
                 or shown.area < LEAST_SHOWN * last.area
+                or shown.height > tallest
                 or shown.intersection(reach) < COVERED * least
                 or shown.iou(last) < likest
             ):
