@@ -10,6 +10,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Iterator
@@ -128,6 +129,21 @@ def test_one_in_a_callback_of_the_interpreter_comes_again(
     with pytest.raises(KeyboardInterrupt), interrupts.handled():
         work()
     assert capsys.readouterr().err == ''
+
+
+def test_one_that_comes_again_before_the_callback_has_ended_is_not_lost(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The thread that sends it may be faster than the one that starts it."""
+    start, early = threading.Timer.start, iter([True])
+
+    def started(timer: threading.Timer) -> None:
+        if next(early, False):
+            signal.raise_signal(signal.SIGINT)
+        start(timer)
+
+    monkeypatch.setattr(threading.Timer, 'start', started)
+    test_one_in_a_callback_of_the_interpreter_comes_again(capsys)
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:

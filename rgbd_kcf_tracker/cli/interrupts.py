@@ -83,7 +83,7 @@ class Interrupts:
             raise KeyboardInterrupt
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if (self.asked or not self._held) and self._later and _is_importing(frame):
+        if (self.asked or not self._held) and self._later and _is_lost(frame):
             self._come_again()
             return
         again, self.asked = self.asked, True
@@ -101,13 +101,17 @@ class Interrupts:
         threading.Timer(_LATER_S, again).start()
 
 
-def _is_importing(frame: FrameType | None) -> bool:
+def _is_lost(frame: FrameType | None) -> bool:
+    """Whether what comes up there is lost: in an import, or where a lost one is told."""
     while frame is not None:
-        if frame.f_code.co_filename.startswith('<frozen importlib'):
+        code = frame.f_code
+        if code.co_filename.startswith('<frozen importlib') or code is _COMES_AGAIN:
             return True
         frame = frame.f_back
     return False
 
+
+_COMES_AGAIN = Interrupts._come_again.__code__
 
 interrupts = Interrupts()
 """The one of this process: it has one signal."""
