@@ -65,10 +65,8 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     told = _told(scene, box)
     whole = whole_of(account, box)
     behind = _pieces_in(scene, told, 0.0 if whole is None else _fit(box_about(scene, whole), told))
-    if behind is not None and whole is not None:
-        return behind
     if whole is not None:
-        return _within(scene, whole, box)
+        return behind or _within(scene, whole, box)
     piece = _piece_of(scene, told)
     if piece is not None and _found_again(account, piece, parameters):
         return piece

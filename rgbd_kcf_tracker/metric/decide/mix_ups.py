@@ -116,7 +116,7 @@ class MixUps:
     def __init__(self) -> None:
         self._meetings: dict[tuple[int, int], _Doubt] = {}
         self._returns: dict[int, _Doubt] = {}
-        self._hidden: dict[tuple[int, int], _Doubt] = {}
+        self._hidden: dict[tuple[int, int], Tally] = {}
         self._time, self._counts = 0.0, 1.0
 
     def watch(
@@ -199,7 +199,7 @@ class MixUps:
         """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
         near = {number for pair in self._meetings for number in pair}
         hidden = [each for each in gone if time - each.person.seen_at < HIDDEN_FOR]
-        doubts: dict[tuple[int, int], _Doubt] = {}
+        tallies: dict[tuple[int, int], Tally] = {}
         found = None
         for one in here:
             for other in hidden if one.person.number in near else ():
@@ -212,13 +212,13 @@ class MixUps:
                     continue
                 odds = other.person.gallery.log_odds(one.view, float(likeness[other.views].max()))
                 key = one.person.number, other.person.number
-                doubt = doubts[key] = self._hidden.get(key) or _Doubt(since, time)
-                doubt.said.add(min(odds, odds - taken), self._counts * one.view.shows, time)
-                if found is None and doubt.said.odds(SIGHTINGS) > ANOTHER:
+                said = tallies[key] = self._hidden.get(key) or Tally()
+                said.add(min(odds, odds - taken), self._counts * one.view.shows, time)
+                if found is None and said.odds(SIGHTINGS) > ANOTHER:
                     second = None if other.person.chosen else other.person
                     found = MixUp(one.person, second, since)
-                    del doubts[key]
-        self._hidden = doubts
+                    del tallies[key]
+        self._hidden = tallies
         return found
 
 
