@@ -346,6 +346,41 @@ def test_a_chosen_target_is_not_told_twice():
     assert boxes[0].iou(boxes[1]) < 0.1
 
 
+@pytest.mark.parametrize('late', [1, 4])
+def test_targets_are_followed_on_when_the_intrinsics_come_after_the_first_images(late: int):
+    """A busy machine heard camera_info after the first image: the target was lost for good."""
+    narrow = dataclasses.replace(CAMERA, fx=CAMERA.fx / 1.6, fy=CAMERA.fy / 1.6)
+    targets = TargetSet('metric')
+
+    def scene(i: int) -> Frame:
+        return dataclasses.replace(both(i), intrinsics=None if i < late else narrow)
+
+    numbers = [targets.add(scene(0), one(0).box) for one in (left, right)]
+    for i in range(1, 20):
+        tracks = targets.update(scene(i))
+        assert list(tracks) == numbers
+        for number, one in zip(numbers, (left, right), strict=True):
+            assert tracks[number].id == number
+            assert tracks[number].box is not None
+            assert tracks[number].box.iou(one(i).box) > 0.6
+    # The parts of people are painted as seen by another camera.
+    x, _, z = tracks[numbers[0]].position
+    assert z == pytest.approx(3.0, abs=0.2)
+    assert x == pytest.approx(1.6 * left(19).x, abs=0.2)
+
+
+def test_intrinsics_that_are_left_out_once_are_no_other_camera():
+    targets = TargetSet('metric')
+    number = targets.add(both(0), left(0).box)
+    assert targets.metric is not None
+    crowd = targets.metric._crowd
+    for i in range(1, 8):
+        frame = both(i)
+        targets.update(dataclasses.replace(frame, intrinsics=None) if i == 4 else frame)
+    assert targets.metric._crowd is crowd
+    assert number in targets.update(both(8))
+
+
 # -- while hidden ---------------------------------------------------------------------------------
 
 BOARD = Box(110, 0, 50, ROWS)

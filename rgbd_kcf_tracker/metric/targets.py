@@ -15,7 +15,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.metric.by_surface import Candidate
 from rgbd_kcf_tracker.metric.decide.account import Account
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
@@ -39,6 +39,9 @@ from rgbd_kcf_tracker.track import Track, TrackState, require_inside
 SHORTEST_STEP = 1e-3
 LONGEST_STEP = 5.0
 """Seconds between two frames; stamps that stand still or jump are taken as these."""
+SAME_CAMERA = 0.02
+"""Share by which the focal length of one camera may be told otherwise: more than calibrations of it
+differ by, and less than anybody's height is known to."""
 TURNS = 30.0
 """Times a second, of all targets together, that one followed by its look is searched for or learned
 from: each of a camera's 30 frames a second has time for one of them, whatever else it shows. One
@@ -61,12 +64,11 @@ class MetricTargets:
     """
 
     def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
-        p = self._parameters = parameters
+        self._parameters = parameters
         self._cues = cues
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
-        self._reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin)
-        self._crowd = Crowd()
+        self._reader, self._crowd = self._new_memory()
         self._followers: dict[int, Follower] = {}
         self._waiting: list[int] = []
         self._names: dict[int, int] = {}
@@ -74,6 +76,7 @@ class MetricTargets:
         self._stamp_ns: int | None = None
         self._time = 0.0
         self._frame: Frame | None = None
+        self._camera: Intrinsics | None = None
 
     def __len__(self) -> int:
         return len(self._followers)
@@ -96,12 +99,7 @@ class MetricTargets:
                 self._perceive(frame)
                 self._unlearned = True
             self._learn()
-        follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
-        if self.account is not None and follower.seen is not None:
-            # Whoever stood there from the first frame on was taken for a part of the room.
-            self._reader.is_somebody(follower.seen)
-            if follower.person is not None:
-                follower.person.figure |= makes_figure(self.account.scene, follower.seen)
+        follower = self._follower(frame, box)
         number = self._name(follower.person)
         self._followers[number] = follower
         return number
@@ -131,6 +129,9 @@ class MetricTargets:
             self._frame = None
             return {}
         self.settle()
+        if self._in_other_metres(frame):
+            self._start_over(frame)
+            return {number: each.track for number, each in self._followers.items()}
         dt = self._perceive(frame)
         turns = self._turns(dt)
         view = self._reader.last_view
@@ -172,6 +173,50 @@ class MetricTargets:
 
     # -- parts ------------------------------------------------------------------------------------
 
+    def _new_memory(self) -> tuple[SceneReader, Crowd]:
+        p = self._parameters
+        return SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin), Crowd()
+
+    def _follower(self, frame: Frame, box: Box) -> Follower:
+        """Whoever is in a box of the frame that was perceived."""
+        follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
+        if self.account is not None and follower.seen is not None:
+            # Whoever stood there from the first frame on was taken for a part of the room.
+            self._reader.is_somebody(follower.seen)
+            if follower.person is not None:
+                follower.person.figure |= makes_figure(self.account.scene, follower.seen)
+        return follower
+
+    def _in_other_metres(self, frame: Frame) -> bool:
+        """Whether the camera turns out to be another than was taken so far, and all are seen.
+
+        So it is where the first images come before the intrinsics do: whatever is remembered is in
+        metres that were a guess. While somebody is hidden, that is all that is known of him.
+        """
+        last = self._frame
+        if last is None or frame.intrinsics is None or last.depth is None or frame.depth is None:
+            return False
+        if (last.width, last.height) != (frame.width, frame.height):
+            return False
+        taken = self._camera or Intrinsics.guess(last.width, last.height)
+        same = abs(frame.intrinsics.fx / taken.fx - 1) < SAME_CAMERA
+        return not same and all(f.track.box is not None for f in self._followers.values())
+
+    def _start_over(self, frame: Frame) -> None:
+        """Start on all where they were a frame ago: what was remembered is in other metres."""
+        before = {number: each.track for number, each in self._followers.items()}
+        self._reader, self._crowd = self._new_memory()
+        self._names, self._followers = {}, {}
+        self._perceive(frame)
+        self._unlearned = True
+        self._learn()
+        for number, track in before.items():
+            assert track.box is not None
+            follower = self._followers[number] = self._follower(frame, track.box)
+            follower.track = dataclasses.replace(follower.first, id=number, score=track.score)
+            if follower.person is not None:
+                self._names[follower.person.number] = number
+
     def _perceive(self, frame: Frame) -> float:
         dt = 0.0
         if self._stamp_ns is not None:
@@ -179,6 +224,7 @@ class MetricTargets:
         self._stamp_ns = frame.stamp_ns
         self._time += dt
         self._frame = frame
+        self._camera = frame.intrinsics or self._camera
         scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
         self.account = None if scene is None else self._crowd.explain(scene, self._time)
         return dt
