@@ -391,6 +391,26 @@ def test_depth_without_a_reading(live: Live, fill: str) -> None:
     live.goes_on(first + 5)
 
 
+def test_depth_with_numbers_that_are_no_metres(live: Live) -> None:
+    """They were taken as no reading, and nobody was told."""
+    first = live.begin()
+    rig, since = live.rig, len(live.rig.boxes)
+    live.node._processor._depth_wanted = lambda: True
+    for index in range(first, first + 5):
+        _, depth, truth = scene(index)
+        metres = (depth / 1000).astype(np.float32)
+        metres[:32] = 3e9
+        rig.send_color(index)
+        rig.depth.publish(image_message(rig.header(index), metres, '32FC1'))
+        time.sleep(0.02)
+    live.answered(since, 5)
+    live.says('odd_depth', 'not between 0.001 and 65.535 metres')
+    assert live.added('odd_depth') == 5
+    assert live.added('empty_depth') == live.added('bad_depth') == 0
+    assert rig.box().iou(truth) > 0.5
+    live.goes_on(first + 5)
+
+
 def cut(message: Image) -> None:
     message.data = message.data[: len(message.data) // 2]
 

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
-from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.frame import FARTHEST_M, NEAREST_M, Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.live.answer import Answer
@@ -132,7 +132,7 @@ class Processor:
             decode_color if color_transport == RAW else decode_compressed_color,
             max_pixels=max_pixels,
         )
-        self._decode_depth: Callable[[Any], DepthImage] = partial(
+        self._decode_depth: Callable[..., DepthImage] = partial(
             defer_depth if depth_transport == RAW else decode_compressed_depth,
             max_pixels=max_pixels,
         )
@@ -258,18 +258,25 @@ class Processor:
         return uses or self.session.choosing
 
     def _readable_depth(self, message: Any, color: ColorImage) -> DepthImage | None:
+        refused: list[int] = []
         try:
-            depth = self._decode_depth(message)
+            depth = self._decode_depth(message, refused=refused.append)
             Frame(color, depth)
         except RgbdKcfError as error:
             self._fault('bad_depth', f'depth image cannot be used: {error}')
             return None
-        # One pixel in 256 is enough to tell an empty image from a sparse one.
+        # One pixel in 256 is enough to tell an empty image from a sparse one, and metres.
         sample = depth[::16, ::16]
         if not (sample > 0).any() and not (depth > 0).any():
             self._fault(
                 'empty_depth',
                 'depth image has no reading at all: is the sensor covered, or its 32FC1 no metres?',
+            )
+        elif refused:
+            self._fault(
+                'odd_depth',
+                f'depth image has numbers that are not between {NEAREST_M:g} and {FARTHEST_M:g} '
+                'metres: taken as no reading',
             )
         return depth
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Any, cast
 
 import cv2
@@ -153,15 +154,18 @@ def decode_depth(
     return metres_from_float(values, refused)
 
 
-def defer_depth(msg: Any, max_pixels: int = MAX_PIXELS) -> DepthImage:
+def defer_depth(
+    msg: Any, max_pixels: int = MAX_PIXELS, refused: Refused | None = None
+) -> DepthImage:
     """The same, made metres where it is looked at: see :class:`DeferredDepth`.
 
     Raises:
         ImageError: as :func:`decode_depth`.
     """
     values = _depth_values(msg, max_pixels)
-    convert = metres_from_mm if values.dtype.kind == 'u' else metres_from_float
-    return cast(DepthImage, DeferredDepth(values, convert))
+    if values.dtype.kind == 'u':
+        return cast(DepthImage, DeferredDepth(values, metres_from_mm))
+    return cast(DepthImage, DeferredDepth(values, partial(metres_from_float, refused=refused)))
 
 
 def decode_compressed_color(msg: Any, max_pixels: int = MAX_PIXELS) -> ColorImage:
