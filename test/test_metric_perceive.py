@@ -837,6 +837,38 @@ def test_who_stands_half_behind_another_is_not_joined_with_him():
     assert not left.parted
 
 
+@pytest.mark.parametrize(('z', 'two'), [(2.5, True), (2.25, False)])
+def test_who_comes_out_from_behind_another_and_touches_him_is_told_by_depth(z: float, two: bool):
+    """Nobody is expected there, and no two heads show side by side: they were one figure."""
+    people = [Someone(-0.1, 2.0), Someone(0.16, z)]
+    left, right = (round(x) for x in (people[0].box.right, people[1].box.right))
+
+    def touch(depth: np.ndarray) -> np.ndarray:
+        # An arm leads from one to the other.
+        row = round(people[0].box.cy)
+        depth[row : row + 4, left:right] = np.linspace(2.0, z, right - left)
+        return depth
+
+    figures = find_figures(scene_of(people, touch), NONE_EXPECTED)
+    assert len(figures) == 1 + two
+    if two:
+        nearer, farther = sorted(figures, key=lambda figure: figure.place[1])
+        assert outline(nearer.seen).iou(people[0].box) > 0.8
+        assert farther.place[1] == pytest.approx(z, abs=0.05)
+        assert farther.parted
+
+
+def test_a_table_that_leads_from_near_to_far_is_not_two():
+    one = Someone(0.0, 3.0)
+
+    def side(depth: np.ndarray) -> np.ndarray:
+        rows, cols = slice(int(one.box.y), int(one.box.bottom)), slice(100, 130)
+        depth[rows, cols] = np.linspace(2.6, 3.2, 30)
+        return depth
+
+    assert len(find_figures(scene_of([], side), NONE_EXPECTED)) == 1
+
+
 def test_somebody_who_waves_is_one():
     one = Someone(0.0, 3.0)
     reader = SceneReader(COLS, 0.04, 0.03, 0.0)
