@@ -353,6 +353,11 @@ def test_what_shows_behind_a_target_that_has_gone_is_not_the_target():
         assert track.box is None
 
 
+def test_who_comes_so_near_that_his_head_leaves_the_picture_is_followed():
+    """Her stripes seemed to be others, as they were counted from the picture's upper end."""
+    assert follow(simulate('approach', seed=191, rate_hz=10.0)).success > 0.95
+
+
 def test_a_face_does_not_become_the_body_below_it():
     """What was cut out of the body by the box of the look had the same outline as that."""
     run = follow(simulate('face', seed=84, rate_hz=5.0, duration_s=3.0, size=SIZE))

@@ -34,7 +34,7 @@ from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
-from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight
+from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight, look_of
 from rgbd_kcf_tracker.metric.decide.arrivals import (
     GONE,
     RETURN,
@@ -49,6 +49,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
+from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
@@ -79,6 +80,7 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
+from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized
@@ -149,6 +151,25 @@ def test_parts_are_compared_with_the_same_parts():
     assert alike(upper, whole) > 0.95
     # The other way round: red trousers are no red shirt.
     assert alike(look(RED, GREEN), look(GREEN, RED)) < 0.5
+
+
+@pytest.mark.parametrize('floor', [True, False])
+def test_who_stands_before_the_pictures_upper_end_is_compared_from_where_his_head_is(floor: bool):
+    def seen(z: float) -> View:
+        reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+        for i in range(5):
+            scene = reader.read(picture([Someone(0.0, z)] if i > 3 else [], 0.1 * i), 0.1)
+        assert scene is not None
+        if floor:  # 1.65 m below the head
+            rows = np.arange(ROWS, dtype=np.float32)[:, None]
+            above = 0.9 - (rows - CAMERA.cy) * scene.view.depth / CAMERA.fy
+            scene = dataclasses.replace(scene, elevation=above.astype(np.float32))
+        (figure,) = find_figures(scene, np.zeros((0, 2)))
+        return look_of(scene, figure.seen, figure.top)
+
+    far, near = seen(3.0), seen(1.0)
+    assert near.top is None
+    assert (alike(near, far) > 0.95) == floor
 
 
 def test_a_view_without_common_parts_says_nothing():
@@ -335,16 +356,19 @@ def test_the_place_says_less_the_longer_somebody_is_away():
 def test_who_stood_stands_there_still_unless_the_camera_sees_past_his_place(
     behind: float, stays: bool
 ):
-    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    account = Watched().see(Someone(0.0, 3.0))
+    sight = account.sights[0].figure.seen
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     for i in range(1, 5):
         one.moved_to(np.array([0.0, 3.0]), 0.5 * i)
     one.last = sight
+    one.calm = Calm(sight, account.scene.view, account.scene.image, 0.0)
     depth = np.full((ROWS, COLS), sight.depth + behind, np.float32)
     one.missed(depth)
     one.missed(np.zeros_like(depth))  # no reading there: that shows nothing
     there, beside = one.place_log_odds(np.array([[0.0, 3.0], [1.0, 3.0]]), 4.0)
     assert one.hidden == stays
+    assert (one.calm is not None) == stays, 'what goes away is no furniture'
     assert (there - beside > 0.8) == stays
 
 
@@ -1729,6 +1753,94 @@ def test_who_was_half_hidden_when_he_was_chosen_is_followed_whole_once_he_shows(
         assert track.score > 0.9
     assert targets.metric.person(number) is person
     assert not any(view is half for view in person.gallery.views for half in halves)
+
+
+@pytest.mark.parametrize('camera', ['noisy', 'noisy and stirs', 'repeats itself'])
+def test_what_does_not_stir_is_not_somebody_who_walked(camera: str):
+    """At 1 Hz a covered chair came to light a metre beside him, and was he from then on."""
+    targets = TargetSet('metric')
+    assert targets.metric is not None
+    rng = np.random.default_rng(1)
+    one, chair = Someone(-0.3, 3.0), Someone(0.65, 2.7)
+    number = targets.add(picture([one, chair], 0.0, Box(140, 0, 60, ROWS)), one.box)
+    person = targets.metric.person(number)
+    assert person is not None
+    boxes = []
+    for i in range(1, 7):
+        x = chair.x + 0.04 * (i % 2) * (camera == 'noisy and stirs')
+        # Who passes before it in the first of them hides some of it.
+        passes = Box(176, 0, 30, ROWS) if i == 1 else None
+        frame = picture([dataclasses.replace(chair, x=x)], float(i), passes)
+        if camera != 'repeats itself':
+            noise = rng.normal(0, 3, frame.color.shape)
+            color = np.clip(frame.color + noise, 0, 255).astype(np.uint8)
+            frame = dataclasses.replace(frame, color=color)
+        boxes.append(targets.update(frame)[number].box)
+    stays = camera != 'noisy'
+    assert all(box is not None for box in boxes[:3])
+    assert all((box is not None) == stays for box in boxes[3:])
+    assert (person.seen_at > 1.0) == stays
+    if not stays:  # nothing of it is known as his, and he may come back
+        assert len(person.gallery.views) == 1
+        back = Someone(-1.2, 3.2)
+        for i in range(7, 12):
+            track = targets.update(picture([chair, back], float(i)))[number]
+        assert track.box is not None
+        assert track.box.iou(back.box) > 0.8
+
+
+@pytest.mark.parametrize('chosen', ['thing', 'stays'])
+def test_things_and_who_stays_where_he_was_chosen_need_not_stir(chosen: str):
+    targets = TargetSet('metric')
+    one = Someone(0.0, 3.0)
+    box = one.box if chosen == 'stays' else Box(110, 60, 30, 30)
+
+    def frame(i: int, left: int = 0) -> Frame:
+        color, depth = images([one] if chosen == 'stays' else [])
+        if chosen == 'thing':
+            rows, cols = slice(60, 90), slice(110 + left, 140 + left)
+            color[rows, cols], depth[rows, cols] = RED, 2.0
+        return Frame(color, depth, i * 10**9, CAMERA)
+
+    number = targets.add(frame(0), box)
+    for i in range(1, 12):
+        track = targets.update(frame(i, 24 if i > 3 else 0))[number]
+        assert track.box is not None, i
+
+
+@pytest.mark.parametrize(('behind', 'whole'), [(0.1, True), (0.45, False)])
+def test_who_comes_out_from_behind_a_half_hidden_target_is_no_part_of_it(
+    monkeypatch: pytest.MonkeyPatch, behind: float, whole: bool
+):
+    """They touched, and for a moment were one figure: the target became both, then the other."""
+    started = []
+    over = follower.Follower._start_over
+    monkeypatch.setattr(
+        follower.Follower,
+        '_start_over',
+        lambda self, account, seen: (started.append(seen), over(self, account, seen)),
+    )
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(6):
+        targets.update(picture([], 0.1 * i))
+    one = Someone(0.0, 2.4)
+    middle = round(one.box.cx)
+    for i in range(6, 10):
+        color, depth = images([one])
+        if i < 9:
+            color[:, middle:], depth[:, middle:] = GREY, 1.0  # hides his other half
+        else:
+            right = depth[:, middle:]
+            farther = right == one.z
+            ramp = one.z + np.minimum(behind, 0.08 * np.arange(1, right.shape[1] + 1))
+            depth[:, middle:] = np.where(farther, ramp, right)
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        targets.update(frame)
+        if i == 6:
+            half = Box(one.box.x, one.box.y, middle - one.box.x, one.box.height)
+            targets.add(frame, half)
+    assert bool(started) == whole
 
 
 def test_a_target_that_may_be_his_twin_has_not_met_him():

@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -145,6 +146,13 @@ class Follower:
         if self._look is not None:
             self._look.settle()
 
+    def lose(self, gone: float) -> None:
+        """Who was followed is not the target, which has been away for ``gone`` seconds."""
+        self._hidden_for = gone
+        if self._surface is not None:
+            self._surface.disown(gone)
+        self._comeback = None
+
     @property
     def by_look(self) -> bool:
         """Whether it is followed by its look, as depth has not told it from the rest."""
@@ -239,7 +247,7 @@ class Follower:
                 score *= likely.score
                 self._doubt(KNOWN_BEFORE, found, score)
             if likely.looks < max(DISOWNED, likely.rival):
-                self._disown(self._comeback, account.time, surface)
+                self._disown(self._comeback, account.time)
                 return self._hidden(frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
@@ -285,13 +293,11 @@ class Follower:
             self._crowd.withdraw(self.person, self._comeback)
         self._comeback = None
 
-    def _disown(self, comeback: Comeback, time: float, surface: BySurface) -> None:
+    def _disown(self, comeback: Comeback, time: float) -> None:
         """Who came back is somebody else: the target is still away."""
         assert self.person is not None
         self._crowd.disown(self.person, comeback)
-        self._hidden_for = time - comeback.left
-        surface.disown(self._hidden_for)
-        self._comeback = None
+        self.lose(time - comeback.left)
 
     def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:
         """All of somebody of whom something hid a part when he was chosen, as soon as it shows."""
@@ -307,7 +313,7 @@ class Follower:
             return None
         if owner >= 0 and account.people[owner] is not self.person:
             return None
-        return figure.seen
+        return figure.seen if _as_deep(account, figure.seen, seen) else None
 
     def _start_over(self, account: Account, whole: Silhouette) -> None:
         assert self.person is not None
@@ -429,6 +435,17 @@ class Follower:
             predicted=place if depth is None else None,
             velocity_covariance=row_by_row(belief.velocity_covariance),
         )
+
+
+def _as_deep(account: Account, whole: Silhouette, part: Silhouette) -> bool:
+    """Whether the rest of somebody is as far along the floor as a part of him, as limbs may be.
+
+    Else it is who comes out from behind the part, and touches it.
+    """
+    rest = whole.mask & ~part.common(whole)
+    ahead = account.scene.forward[whole.rows, whole.cols][rest]
+    here = float(account.place(part)[1])
+    return abs(float(ahead.mean()) - here) < DEPTH_STEP + DEPTH_STEP_PER_METRE * here
 
 
 def _score(look: Look, stood: float) -> float:

@@ -16,15 +16,19 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
+from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import View, similarity
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import HEADED
 
 SMALL = 0.1
 """Square metres of a thing up to which it may be part of somebody's figure: what fits in the hands
 or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
+STATURE = 1.7
+"""Metres of a person of mean height: most differ from it by less than half a slice of a view."""
 STEP, STEP_PER_SECOND = 0.3, 1.0
 """Metres in depth by which somebody's pixels differ, about an arm's reach, and metres a second
 that they may have moved on since the last sight: a walk."""
@@ -126,6 +130,16 @@ class Account:
         return [self.people[row] for row in self.owner if row >= 0]
 
     @property
+    def calm(self) -> list[tuple[Person, Calm, Silhouette]]:
+        """Those in view who have not stirred for so long that they are furniture, and where."""
+        return [
+            (person, person.calm, person.last)
+            for person in self.people
+            if person.seen_at == self.time and person.last is not None
+            if person.calm is not None and person.calm.long(self.time)
+        ]
+
+    @property
     def unmoved(self) -> list[tuple[Person, Silhouette]]:
         """Those in view whom nobody chose and who have never walked, and where they are."""
         pairs = zip(self.owner, self.sights, strict=True)
@@ -179,7 +193,7 @@ class Account:
             if sight.figure.seen.same(seen):
                 return sight.view
         top = None if seen.cut.top else seen.highest(self.scene.elevation)
-        return View.of(self.scene.view, self.scene.codes, seen, top)
+        return look_of(self.scene, seen, top)
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``."""
@@ -322,6 +336,23 @@ class Account:
                 seen = sight.figure.seen
                 mask[seen.rows, seen.cols] |= seen.mask
         return mask
+
+
+def look_of(scene: Scene, seen: Silhouette, top: float | None) -> View:
+    """The look of a silhouette, counted from where the head would be if the image ends below it.
+
+    Args:
+        scene: the scene.
+        seen: the silhouette.
+        top: metres above the floor of its top, or None.
+    """
+    above = 0.0
+    ends = scene.rim.reached(seen.left, seen.top, seen.cols.stop, seen.rows.stop, scene.view)
+    if ends.top:
+        highest = seen.highest(scene.elevation)
+        if highest is not None and highest < HEADED:
+            above = STATURE - highest
+    return View.of(scene.view, scene.codes, seen, top, above)
 
 
 def absent(gone: float, misses: int) -> bool:

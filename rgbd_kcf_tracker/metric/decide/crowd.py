@@ -18,14 +18,15 @@ from rgbd_kcf_tracker.metric.decide.account import (
     SAME_AGAIN,
     Account,
     Sight,
+    look_of,
 )
 from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
+from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -173,7 +174,7 @@ class Crowd:
         self._axes = scene.axes
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
-        sights = [Sight(f, View.of(scene.view, scene.codes, f.seen, f.top)) for f in figures]
+        sights = [Sight(f, look_of(scene, f.seen, f.top)) for f in figures]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account), alike, time)
         if mixed_up is not None:
@@ -349,6 +350,13 @@ class Crowd:
         for each in self.withdraw(person, comeback):
             each.met.add(other.number)
             other.met.add(each.number)
+
+    def is_furniture(self, person: Person, calm: Calm) -> None:
+        """What somebody was found as turns out to be furniture: he is where nobody knows."""
+        person.calm = person.last = None
+        person.mobile = True
+        person.gallery.taken_back(calm.since)
+        person.seen_at, person.misses, person.hidden = calm.since, MISSES, False
 
     def withdraw(self, person: Person, comeback: Comeback) -> list[Person]:
         """Forget what is known of somebody since a return; gives those who were seen beside him."""

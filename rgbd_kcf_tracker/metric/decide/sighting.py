@@ -5,9 +5,12 @@
 
 from __future__ import annotations
 
+import math
+
 from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES
-from rgbd_kcf_tracker.metric.identity.person import TRAVELLED
+from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEADED, person_sized, upright
@@ -21,6 +24,10 @@ few of the slices show that others have them as well."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
 with what is behind, and feet lie as near to the floor as its depth is uncertain."""
+
+LEAP = 0.5
+"""Metres from one sight to the next from which somebody was found, not followed: more than a part
+of him is from another, and than he walks in a third of a second."""
 
 
 def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sure: bool) -> None:
@@ -37,6 +44,7 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     place = account.place(seen)
     gone = account.time - person.seen_at
     if gone > 0:
+        person.calm = _calm(account, person, seen)
         # What comes into view, or out from behind something, seems to walk as more of it shows.
         walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
         person.moved_to(place, account.time, walks)
@@ -79,3 +87,18 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     whole = seen.area > WHOLE and headed and alone and apart
     if whole or not person.gallery.views:
         person.gallery.learn(view, account.time)
+
+
+def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
+    """What somebody is found as elsewhere than he was, if that is calm.
+
+    Who can be followed from where he was is he, however still he stands, and so is who stays where
+    he was hidden; and things stay where they are put.
+    """
+    scene = account.scene
+    if scene.motion is not None:
+        return None
+    if person.upright and math.dist(account.place(seen), person.place) > LEAP:
+        return Calm(seen, scene.view, scene.image, account.time)
+    calm = person.calm
+    return calm if calm is not None and calm.holds(seen, scene.image) else None

@@ -96,7 +96,14 @@ class View:
     top: float | None
 
     @classmethod
-    def of(cls, view: DepthView, codes: ColorCodes, seen: Silhouette, top: float | None) -> View:
+    def of(
+        cls,
+        view: DepthView,
+        codes: ColorCodes,
+        seen: Silhouette,
+        top: float | None,
+        above: float = 0.0,
+    ) -> View:
         """The look of a silhouette.
 
         Args:
@@ -104,13 +111,14 @@ class View:
             codes: of the view's colours.
             seen: the silhouette.
             top: metres above the floor of its top, or None.
+            above: metres of him that are above the silhouette, where that is known.
         """
         mask = seen.mask.view(np.uint8)
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=0)
         mask = inner if np.count_nonzero(inner) >= LEAST_PIXELS else mask
-        down = (np.arange(len(mask), dtype=np.float32) + 0.5) * np.float32(
-            seen.depth / view.intrinsics.fy / SLICE
-        )
+        down = np.float32(above / SLICE) + (
+            np.arange(len(mask), dtype=np.float32) + 0.5
+        ) * np.float32(seen.depth / view.intrinsics.fy / SLICE)
         part = np.minimum(down.astype(np.int32), SLICES - 1)[:, None] * CODES
         parts = (codes[seen.rows, seen.cols] + part)[mask.view(np.bool_)]
         counts = np.bincount(parts, minlength=SLICES * CODES).astype(np.float32)

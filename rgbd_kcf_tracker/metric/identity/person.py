@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
@@ -80,6 +81,7 @@ class Person:
         hidden: whether it may still stand there, as nothing beyond that place has shown since.
         upright: whether it ever had the shape of a person.
         figure: whether it was a figure when it was last seen, and not a thing too small for one.
+        calm: what it was found as elsewhere than where it had been, until that stirs.
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
@@ -97,6 +99,7 @@ class Person:
         self.hidden = True
         self.met: set[int] = set()
         self.last: Silhouette | None = None
+        self.calm: Calm | None = None
         self.area, self.again = 0.0, -math.inf
         self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
@@ -159,6 +162,8 @@ class Person:
         there = depth[self.last.rows, self.last.cols][self.last.mask]
         past = int(np.count_nonzero(there > self.last.depth + BEYOND))
         self.hidden = past < EMPTY * len(there)
+        if not self.hidden:  # what goes away is no furniture
+            self.calm = None
 
     def out_of_reach(self, place: FloatArray, time: float) -> bool:
         """Whether it cannot have got to ``place``, ``(2,)`` metres, since it was last seen."""
@@ -226,6 +231,7 @@ class Person:
         self.came, other.came = other.came, self.came
         self.misses, other.misses = other.misses, self.misses
         self.last, other.last = other.last, self.last
+        self.calm, other.calm = other.calm, self.calm
         self.hidden, other.hidden = other.hidden, self.hidden
         self.figure, other.figure = other.figure, self.figure
         mine, his = self.gallery.taken_back(since), other.gallery.taken_back(since)

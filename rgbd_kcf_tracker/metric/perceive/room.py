@@ -199,6 +199,12 @@ class Room:
         self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
 
+    def close(self, part: Mask, depth: DepthArray) -> None:
+        """Take pixels, ``(h, w)`` bool, into the room: they turned out to be part of it."""
+        self.depth[part] = depth[part]
+        self._blind[part] = 0
+        self.before &= ~part
+
     def passing(self, people: Mask, depth: DepthArray, surfaces: Surfaces) -> Mask:
         """Those of people's pixels, ``(h, w)`` bool, whose surface does not stand before the room.
 
@@ -275,9 +281,7 @@ class Room:
         part = somebody & room[surfaces.labels]
         if np.count_nonzero(part) <= MOST * np.count_nonzero(somebody):
             return False
-        self.depth[part] = depth[part]
-        self._blind[part] = 0
-        self.before &= ~part
+        self.close(part, depth)
         return True
 
     def going_on(

@@ -229,6 +229,11 @@ class SceneReader:
         if self.last_view is not None:
             self.room.open(seen.in_view(self.last_view.shape), self.last_view.depth)
 
+    def is_furniture(self, seen: Silhouette) -> None:
+        """Take the pixels of a silhouette of the last scene into what stands still."""
+        if self.last_view is not None:
+            self.room.close(seen.in_view(self.last_view.shape), self.last_view.depth)
+
     def is_room(self, seen: Silhouette, scene: Scene) -> bool:
         """Whether a silhouette of the last scene turns out to be part of the room it stands before.
 

@@ -156,15 +156,20 @@ class Silhouette:
             and bool(np.array_equal(self.mask, other.mask))
         )
 
-    def meets(self, other: Silhouette) -> bool:
-        """Whether another silhouette of the same view shares a pixel with it."""
+    def common(self, other: Silhouette) -> Mask:
+        """Which pixels of the other's crop both have, ``(h, w)`` bool of that crop."""
+        shared = np.zeros_like(other.mask)
         y0, y1 = max(self.top, other.top), min(self.rows.stop, other.rows.stop)
         x0, x1 = max(self.left, other.left), min(self.cols.stop, other.cols.stop)
-        if y0 >= y1 or x0 >= x1:
-            return False
-        mine = self.mask[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left]
-        theirs = other.mask[y0 - other.top : y1 - other.top, x0 - other.left : x1 - other.left]
-        return bool((mine & theirs).any())
+        if y0 < y1 and x0 < x1:
+            theirs = np.s_[y0 - other.top : y1 - other.top, x0 - other.left : x1 - other.left]
+            mine = self.mask[y0 - self.top : y1 - self.top, x0 - self.left : x1 - self.left]
+            shared[theirs] = mine & other.mask[theirs]
+        return shared
+
+    def meets(self, other: Silhouette) -> bool:
+        """Whether another silhouette of the same view shares a pixel with it."""
+        return bool(self.common(other).any())
 
     @property
     def rows(self) -> slice:
