@@ -1843,6 +1843,35 @@ def test_who_comes_out_from_behind_a_half_hidden_target_is_no_part_of_it(
     assert bool(started) == whole
 
 
+@pytest.mark.parametrize(('read', 'whole'), [(3.0, True), (1.5, False), (None, False)])
+def test_who_was_too_far_to_be_read_when_a_part_of_him_was_chosen_is_followed_whole_once_he_is(
+    monkeypatch: pytest.MonkeyPatch, read: float | None, whole: bool
+):
+    """The look went on on a strip of him, with a score of 0.9, until he stood before the camera."""
+    one = Someone(0.0, 3.0)
+    strip = Box(one.box.x, one.box.y, 0.35 * one.box.width, one.box.height)
+    targets = TargetSet('metric')
+    for i in range(16):
+        color, depth = images([one])
+        if i < 8:
+            depth[depth == one.z] = np.nan
+        look = Look(strip, 1.0, 1.0, read if i >= 8 else None)
+        monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        if i == 0:
+            number = targets.add(frame, strip)
+            continue
+        track = targets.update(frame)[number]
+        assert track.box is not None
+        if not 8 <= i <= 10:
+            assert track.box.iou(one.box if whole and i > 10 else strip) > 0.8, i
+    assert targets.metric is not None
+    account = targets.metric.account
+    assert account is not None
+    people = [each for each in account.people if each.seen_at == account.time]
+    assert len(people) == 1, 'he is nobody else besides'
+
+
 def test_a_target_that_may_be_his_twin_has_not_met_him():
     targets = TargetSet('metric', MetricParameters(use_others=False))
     assert targets.metric is not None

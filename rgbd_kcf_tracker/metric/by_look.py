@@ -281,6 +281,11 @@ class ByLook:
         self._appearance.attend(frame.color, self._cx, self._cy, self._scale, seconds)
         self._depth = depth_in(frame, box) or self._depth
 
+    @property
+    def unread(self) -> bool:
+        """Whether depth showed nothing of the target when it was chosen."""
+        return self._first_depth is None
+
     def likely(self, image: Image, mask: npt.NDArray[np.bool_]) -> float:
         """Mean probability of some pixels' colours to be the target's and not those around it.
 
@@ -323,7 +328,7 @@ class ByLook:
 
     def _depthless(self, frame: Frame) -> bool:
         """Whether depth tells nothing of the target's size."""
-        return frame.depth is None or self._first_depth is None
+        return frame.depth is None or self.unread
 
     def _keep(self, frame: Frame) -> None:
         if self._depthless(frame):

@@ -195,7 +195,7 @@ class Follower:
             return
         self.seen = seen
         if self.person is None:
-            self.person = self._crowd.chosen(account, seen)
+            self.person = self._crowd.chosen(account, seen, self._since)
             for cue in self._cues:
                 cue.start(frame, box, self.person.number)
         self._surface = BySurface(account, seen, self.person, self._parameters, self._cues, stood)

@@ -197,7 +197,7 @@ class GatedLook:
     def _onto(self, account: Account, look: Look | None) -> Box | None:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
-            newcomer = self._newcomers.find(account, self._look, self._unseen)
+            newcomer = self._newcomers.find(account, self._look, look, self._unseen)
             if newcomer is not None:
                 return newcomer
         if look is None:

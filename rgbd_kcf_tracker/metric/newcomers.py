@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.decide.account import Account
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
@@ -62,12 +62,13 @@ class Newcomers:
             if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
         }
 
-    def find(self, account: Account, look: ByLook, unseen: float) -> Box | None:
+    def find(self, account: Account, look: ByLook, found: Look | None, unseen: float) -> Box | None:
         """The outline of who may be the target, None for nobody.
 
         Args:
             account: of the frame.
             look: of the target.
+            found: what it has found in the frame, None for nothing.
             unseen: seconds since it was last found.
         """
         best, likest, last = None, 0.0, look.last_box
@@ -90,6 +91,11 @@ class Newcomers:
             if self._ends is not None and (
                 (ends.left and self._ends.left) or (ends.right and self._ends.right)
             ):
+                least = min(shown.area, last.area)
+            # Of who was too far off to be read, perhaps a part was chosen, and the look does not
+            # tell how large he gets as he comes nearer.
+            near = found is not None and look.unread and as_near(found.depth, seen.depth)
+            if near and person is not None and person.upright:
                 least = min(shown.area, last.area)
             # Who has taken a step shows whole: a first piece of him is little to know him by.
             reach = last if seen.area < WHOLE else _reach(last, scene, seen.depth, unseen)

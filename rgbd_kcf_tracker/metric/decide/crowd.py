@@ -97,13 +97,20 @@ class Crowd:
         self.people.append(person)
         return person
 
-    def chosen(self, account: Account, seen: Silhouette) -> Person:
-        """Whoever a silhouette of the frame shows, as one who is to be followed from now on."""
-        person = self._chosen(account, seen)
+    def chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
+        """Whoever a silhouette of the frame shows, as one who is to be followed from now on.
+
+        Args:
+            account: of the frame.
+            seen: the silhouette.
+            since: seconds from which he has been followed by other means: who was welcomed
+                meanwhile is he.
+        """
+        person = self._chosen(account, seen, since)
         self._introduce(account, {person.number: seen})
         return person
 
-    def _chosen(self, account: Account, seen: Silhouette) -> Person:
+    def _chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         index = account.figure_of(seen)
         owner = account.owner[index] if index >= 0 else -1
         beside = (
@@ -119,7 +126,9 @@ class Crowd:
                 if not person.chosen and person in self.people:
                     # Nobody: he was made of two, and looks like both.
                     self.people.remove(person)
-            elif account.time == person.seen_at:
+            elif account.time == person.seen_at or (
+                since < person.first_seen and not person.chosen
+            ):
                 person.chosen = True
                 self._welcome_beside(account, person, beside)
                 return person
