@@ -71,6 +71,11 @@ def parted(
     ahead = forward[top : top + rows, left : left + cols]
     z = float(depth[mask].mean())
     narrow = cols * z / k.fx < BROAD
+    far = None
+    if narrow and len(expected) < 2:
+        far = _farther(mask, ahead, z / k.fy)
+        if far is None:
+            return [(left, top, mask)]
     columns = np.arange(left, left + cols) + 0.5 - k.cx
     lines = np.arange(top, top + rows) + 0.5 - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.
@@ -82,14 +87,15 @@ def parted(
         margin = 0.1 * k.fx / z
         inside = (u > -margin) & (u < cols + margin)
         if np.count_nonzero(inside) > 1:
-            near, far = np.percentile(ahead[mask], (5, 95))
-            inside &= (seeds[:, 1] > near - 0.3) & (seeds[:, 1] < far + 0.3)
+            first, last = np.percentile(ahead[mask], (5, 95))
+            inside &= (seeds[:, 1] > first - 0.3) & (seeds[:, 1] < last + 0.3)
         seeds = seeds[inside]
     if len(seeds) < 2 and not narrow:
         seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
-    far = None if len(seeds) > 1 else _farther(mask, ahead, z / k.fy)
-    if len(seeds) < 2 and far is None:
-        return [(left, top, mask)]
+    if len(seeds) < 2:
+        far = _farther(mask, ahead, z / k.fy) if far is None else far
+        if far is None:
+            return [(left, top, mask)]
     v, u_ = np.nonzero(mask)
     reach = np.array([REACH_ACROSS, REACH_DEEP])
     across = (columns[u_] * x_of + lines[v] * y_of) * depth[v, u_]
@@ -139,7 +145,7 @@ def _farther(mask: Mask, ahead: npt.NDArray[np.float32], metres: float) -> Mask 
     """
     if len(mask) * metres < TALL:
         return None
-    values, least = ahead[mask][::EVERY], LEAST_SHARE / 2
+    values, least = ahead[::EVERY][mask[::EVERY]], LEAST_SHARE / 2
     if float(values.var()) < least * (1 - least) * BEHIND**2:  # that of the least part, so far off
         return None
     near, far = np.percentile(values, (5, 95))
