@@ -312,19 +312,24 @@ def test_size_changes(live: Live) -> None:
     live.goes_on(first + 8)
 
 
-def test_depth_of_another_size(live: Live) -> None:
+def after_depth(live: Live, count: int, message: Callable[[np.ndarray], tuple]) -> int:
+    """Play pairs, each answered, with depth made of the scene's millimetres; the next index."""
     first = live.begin()
     rig, since = live.rig, len(live.rig.boxes)
     live.node._processor._depth_wanted = lambda: True
-    for index in range(first, first + 4):
-        color, depth, _ = scene(index)
-        rig.color.publish(image_message(rig.header(index), color, 'bgr8'))
-        rig.depth.publish(image_message(rig.header(index), depth[:200, :300], '16UC1'))
+    for index in range(first, first + count):
+        rig.send_color(index)
+        rig.depth.publish(image_message(rig.header(index), *message(scene(index)[1])))
         time.sleep(0.03)
-    live.answered(since, 4)
+    live.answered(since, count)
+    return first + count
+
+
+def test_depth_of_another_size(live: Live) -> None:
+    index = after_depth(live, 4, lambda depth: (depth[:200, :300], '16UC1'))
     live.says('bad_depth', 'register the depth')
     assert live.added('bad_depth') == 4
-    live.goes_on(first + 4)
+    live.goes_on(index)
 
 
 ENCODED: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -373,42 +378,34 @@ def test_unknown_encoding(live: Live) -> None:
     live.goes_on(first + 4)
 
 
-@pytest.mark.parametrize('fill', ['zero', 'nan'])
-def test_depth_without_a_reading(live: Live, fill: str) -> None:
-    first = live.begin()
-    rig, since = live.rig, len(live.rig.boxes)
-    live.node._processor._depth_wanted = lambda: True
-    for index in range(first, first + 5):
-        rig.send_color(index)
-        if fill == 'zero':
-            empty, encoding = np.zeros((HEIGHT, WIDTH), np.uint16), '16UC1'
-        else:
-            empty, encoding = np.full((HEIGHT, WIDTH), np.nan, np.float32), '32FC1'
-        rig.depth.publish(image_message(rig.header(index), empty, encoding))
-        time.sleep(0.02)
-    live.answered(since, 5)
+@pytest.mark.parametrize(
+    ('empty', 'encoding'),
+    [
+        (np.zeros((HEIGHT, WIDTH), np.uint16), '16UC1'),
+        (np.full((HEIGHT, WIDTH), np.nan, np.float32), '32FC1'),
+    ],
+    ids=['zero', 'nan'],
+)
+def test_depth_without_a_reading(live: Live, empty: np.ndarray, encoding: str) -> None:
+    index = after_depth(live, 5, lambda depth: (empty, encoding))
     live.says('empty_depth', 'no reading at all')
-    live.goes_on(first + 5)
+    live.goes_on(index)
 
 
 def test_depth_with_numbers_that_are_no_metres(live: Live) -> None:
     """They were taken as no reading, and nobody was told."""
-    first = live.begin()
-    rig, since = live.rig, len(live.rig.boxes)
-    live.node._processor._depth_wanted = lambda: True
-    for index in range(first, first + 5):
-        _, depth, truth = scene(index)
+
+    def odd(depth: np.ndarray) -> tuple[np.ndarray, str]:
         metres = (depth / 1000).astype(np.float32)
         metres[:32] = 3e9
-        rig.send_color(index)
-        rig.depth.publish(image_message(rig.header(index), metres, '32FC1'))
-        time.sleep(0.02)
-    live.answered(since, 5)
+        return metres, '32FC1'
+
+    index = after_depth(live, 5, odd)
     live.says('odd_depth', 'not between 0.001 and 65.535 metres')
     assert live.added('odd_depth') == 5
     assert live.added('empty_depth') == live.added('bad_depth') == 0
-    assert rig.box().iou(truth) > 0.5
-    live.goes_on(first + 5)
+    assert live.rig.box().iou(scene(index - 1)[2]) > 0.5
+    live.goes_on(index)
 
 
 def cut(message: Image) -> None:

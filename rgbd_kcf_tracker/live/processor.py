@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from rgbd_kcf_tracker.errors import ImageError, RgbdKcfError
-from rgbd_kcf_tracker.frame import FARTHEST_M, NEAREST_M, Frame
+from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.live.answer import Answer
@@ -35,6 +35,7 @@ from rgbd_kcf_tracker.recordings.images import (
     defer_depth,
 )
 from rgbd_kcf_tracker.recordings.messages import stamp_of
+from rgbd_kcf_tracker.recordings.refused import NO_METRES
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
 
@@ -273,11 +274,7 @@ class Processor:
                 'depth image has no reading at all: is the sensor covered, or its 32FC1 no metres?',
             )
         elif refused:
-            self._fault(
-                'odd_depth',
-                f'depth image has numbers that are not between {NEAREST_M:g} and {FARTHEST_M:g} '
-                'metres: taken as no reading',
-            )
+            self._fault('odd_depth', f'depth image has numbers that are {NO_METRES}')
         return depth
 
     def _notice(self, header: Any, moment: Instant) -> None:

@@ -88,14 +88,14 @@ class Newcomers:
             outline = box_about(scene, seen)
             ends = _ends(outline, scene)
             shown, least = _to_side(outline, ends, scene), outline.area
-            if self._ends is not None and (
+            in_part = self._ends is not None and (
                 (ends.left and self._ends.left) or (ends.right and self._ends.right)
-            ):
-                least = min(shown.area, last.area)
+            )
             # Of who was too far off to be read, perhaps a part was chosen, and the look does not
             # tell how large he gets as he comes nearer.
-            near = found is not None and look.unread and as_near(found.depth, seen.depth)
-            if near and person is not None and person.upright:
+            if found is not None and look.unread and as_near(found.depth, seen.depth):
+                in_part = in_part or (person is not None and person.upright)
+            if in_part:
                 least = min(shown.area, last.area)
             # Who has taken a step shows whole: a first piece of him is little to know him by.
             reach = last if seen.area < WHOLE else _reach(last, scene, seen.depth, unseen)

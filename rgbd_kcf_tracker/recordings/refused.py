@@ -9,6 +9,9 @@ from collections.abc import Callable
 
 from rgbd_kcf_tracker.frame import FARTHEST_M, NEAREST_M
 
+NO_METRES = f'not between {NEAREST_M:g} and {FARTHEST_M:g} metres: taken as no reading'
+"""What such numbers are, for people."""
+
 
 class RefusedReadings:
     """Counts what the depth images of a recording hold that no depth camera measures."""
@@ -35,7 +38,6 @@ class RefusedReadings:
         if self._counts:
             warn(
                 f'{sum(self._counts)} numbers in {len(self._counts)} depth images, first in '
-                f'{self._first}, are not between {NEAREST_M:g} and {FARTHEST_M:g} metres: '
-                'taken as no reading'
+                f'{self._first}, are {NO_METRES}'
             )
         self._counts, self._first = [], ''

@@ -71,11 +71,9 @@ def parted(
     ahead = forward[top : top + rows, left : left + cols]
     z = float(depth[mask].mean())
     narrow = cols * z / k.fx < BROAD
-    far = None
-    if narrow and len(expected) < 2:
-        far = _farther(mask, ahead, z / k.fy)
-        if far is None:
-            return [(left, top, mask)]
+    far = _farther(mask, ahead, z / k.fy)
+    if narrow and len(expected) < 2 and far is None:
+        return [(left, top, mask)]
     columns = np.arange(left, left + cols) + 0.5 - k.cx
     lines = np.arange(top, top + rows) + 0.5 - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.
@@ -92,14 +90,12 @@ def parted(
         seeds = seeds[inside]
     if len(seeds) < 2 and not narrow:
         seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
-    if len(seeds) < 2:
-        far = _farther(mask, ahead, z / k.fy) if far is None else far
-        if far is None:
-            return [(left, top, mask)]
+    if len(seeds) < 2 and far is None:
+        return [(left, top, mask)]
     v, u_ = np.nonzero(mask)
     reach = np.array([REACH_ACROSS, REACH_DEEP])
     across = (columns[u_] * x_of + lines[v] * y_of) * depth[v, u_]
-    if far is not None:
+    if len(seeds) < 2 and far is not None:
         of_far = far[v, u_]
         seeds = np.array(
             [[part[which].mean() for part in (across, ahead[v, u_])] for which in (~of_far, of_far)]
