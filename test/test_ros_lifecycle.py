@@ -37,18 +37,9 @@ pytestmark = pytest.mark.ros
 PROJECT = Path(__file__).resolve().parent.parent
 
 
-def found(rig: Rig, kind: Any, name: str) -> Any:
-    """A client of a service that is there: DDS now and then never joins one, but the next."""
-    for _ in range(4):
-        client = rig.node.create_client(kind, name)
-        if client.wait_for_service(5):
-            return client
-        rig.node.destroy_client(client)
-    raise AssertionError(f'nobody offers {name}')
-
-
 def call(rig: Rig, kind: Any, name: str, request: Any) -> Any:
-    client = found(rig, kind, name)
+    client = rig.node.create_client(kind, name)
+    assert client.wait_for_service(20), f'nobody offers {name}'
     # A server that has not yet found where to answer drops the answer (one-sided discovery): what
     # only asks is asked again.
     for _ in range(11 if kind is GetState else 0):
@@ -205,6 +196,15 @@ def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
         assert change(rig, Transition.TRANSITION_ACTIVATE)
         assert node._session.variant == 'kcf'
         assert node._session.track.state is TrackState.IDLE
+
+
+def test_nothing_of_a_destroyed_node_is_found(rig: Rig) -> None:
+    # What is left of one hides the services of the next of that name from whoever asks for them.
+    with running_node(rig) as node:
+        assert state(rig) == State.PRIMARY_STATE_ACTIVE
+        services = [service.service_name for service in node.services]
+    assert '/tracker/change_state' in services
+    rig.wait(lambda: not any(map(rig.node.count_services, services)), 20, 'its services to go')
 
 
 def test_parameters_are_described(rig: Rig) -> None:

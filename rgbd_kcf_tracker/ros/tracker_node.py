@@ -249,9 +249,15 @@ class TrackerNode(LifecycleNode):
         return super().on_error(state)
 
     def destroy_node(self) -> None:
-        """Stop the worker before the topics go."""
+        """Stop the worker before the topics go, and leave nothing behind that others find."""
         self._stop_listening()
         super().destroy_node()
+        # rclpy leaves the lifecycle services to DDS until the node is garbage. While they go by and
+        # by, a node of the same name that is there has more ends of a service than others, and
+        # whoever counts them (rmw_fastrtps) never finds it. There is no public way.
+        machine = getattr(self, '_state_machine', None)
+        if machine is not None:
+            machine.destroy_when_not_in_use()
 
     def _stop_listening(self) -> None:
         self._poll_timer.cancel()
