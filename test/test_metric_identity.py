@@ -1558,6 +1558,28 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
         assert track.box.iou(one.box) > 0.9
 
 
+@pytest.mark.parametrize('ratio', [0.65, 0.95])
+def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_may_be(
+    ratio: float, monkeypatch: pytest.MonkeyPatch
+):
+    """A frame a second: the wall at the image's side was the target for a minute, at 0.9."""
+    tracker = create_tracker('metric')
+    for i in range(2):
+        one = Someone(-0.7 + 0.6 * i, 3.0)
+        color, depth = images([one])
+        if i == 0:
+            depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        if i == 0:
+            chosen = one.box
+            tracker.start(frame, chosen)
+            look = Look(chosen, ratio, ratio, None)
+            monkeypatch.setattr(ByLook, 'step', lambda *args: look)
+        track = tracker.update(frame)
+    assert track.box is not None
+    assert track.box.iou(one.box if ratio < 0.7 else chosen) > 0.9
+
+
 def test_a_strip_that_shows_where_somebody_was_followed_by_his_look_is_not_he(
     monkeypatch: pytest.MonkeyPatch,
 ):

@@ -704,6 +704,7 @@ def test_head_and_shoulders_are_a_person_and_a_box_is_not():
     [
         (((0.2, 0.19), (0.28, 0.1), (0.9, 0.25), (1.6, 0.18)), True),  # from the side
         (((0.2, 0.19), (0.28, 0.1), (0.5, 0.22), (0.6, 0.7), (1.6, 0.18)), True),  # an arm ahead
+        (((0.06, 0.19), (0.09, 0.28), (0.2, 0.19), (0.28, 0.1), (1.6, 0.18)), True),  # a brim
         (((1.6, 0.2),), False),  # a post
         (((0.3, 0.3), (1.6, 0.05)), False),  # a lamp
         (((0.2, 0.2), (0.28, 0.18), (1.6, 0.22)), False),  # a post with a groove

@@ -17,7 +17,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
+from rgbd_kcf_tracker.metric.by_look import UNSURE, ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
@@ -121,7 +121,7 @@ class GatedLook:
                     self.stood = Stood(place, sigma, width)
                 self.stood.seen(place, sigma, dt)
                 stood = self.stood.log_odds(place, sigma)
-            if account is not None:
+            if account is not None and not self._may_have_gone(look):
                 self._newcomers.keep(account, look.box)
             self._unseen, self._carried = 0.0, False
         else:
@@ -133,7 +133,7 @@ class GatedLook:
         if stood < 0:
             self._agreed = 0
         elif account is not None and in_time:
-            onto = self._onto(account, look)
+            onto = self._onto(account, look, dt)
         return Gated(look, stood, onto)
 
     def _refused(self, account: Account, look: Look) -> bool:
@@ -194,10 +194,15 @@ class GatedLook:
         outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
-    def _onto(self, account: Account, look: Look | None) -> Box | None:
+    def _may_have_gone(self, look: Look) -> bool:
+        """Whether what is found may be what the target has stood before, which depth cannot say."""
+        return self._look.unread and look.depth is None and look.ratio < UNSURE
+
+    def _onto(self, account: Account, look: Look | None, dt: float) -> Box | None:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
-            newcomer = self._newcomers.find(account, self._look, look, self._unseen)
+            gone = look is not None and self._may_have_gone(look)
+            newcomer = self._newcomers.find(account, self._look, look, dt if gone else self._unseen)
             if newcomer is not None:
                 return newcomer
         if look is None:

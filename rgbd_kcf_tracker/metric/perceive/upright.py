@@ -109,7 +109,9 @@ def _necked(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
     head_width, trunk_width = float(head.max()), float(median(trunk.tolist()))
     if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
         return False
-    if not max(TRUNK_WIDTH[0], STOUTER * head_width) <= trunk_width <= TRUNK_WIDTH[1]:
+    # A cap's brim or a nose makes no head broader than the trunk.
+    least = max(TRUNK_WIDTH[0], STOUTER * float(median(head.tolist())))
+    if not least <= trunk_width <= TRUNK_WIDTH[1]:
         return False
     return float(neck.min()) <= SLENDER * head_width
 
