@@ -1574,7 +1574,7 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
             chosen = one.box
             tracker.start(frame, chosen)
             look = Look(chosen, ratio, ratio, None)
-            monkeypatch.setattr(ByLook, 'step', lambda *args: look)
+            monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
         track = tracker.update(frame)
     assert track.box is not None
     assert track.box.iou(one.box if ratio < 0.7 else chosen) > 0.9
