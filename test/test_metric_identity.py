@@ -172,6 +172,32 @@ def test_who_stands_before_the_pictures_upper_end_is_compared_from_where_his_hea
     assert (alike(near, far) > 0.95) == floor
 
 
+@pytest.mark.parametrize('head', [True, False])
+def test_who_shows_beside_the_end_of_depth_is_compared_from_where_his_head_is(head: bool):
+    """Of who comes in, a shoulder is the first that is read; it is no head."""
+
+    def seen(end: float) -> tuple[View, float]:
+        reader, one = SceneReader(COLS, 0.04, 0.03, 0.0), Someone(0.0, 2.6, RED, GREEN)
+        for i in range(5):
+            color, depth = images([one] if i > 3 else [])
+            depth[:, round(end * CAMERA.fx / 2.6 + CAMERA.cx) :] = np.nan
+            frame = Frame(color, depth, round(1e8 * i), CAMERA)
+            scene = reader.read(frame, 0.1)
+        assert scene is not None
+        rows = np.arange(ROWS, dtype=np.float32)[:, None]
+        above = 0.9 - (rows - CAMERA.cy) * scene.view.depth / CAMERA.fy
+        scene = dataclasses.replace(scene, elevation=above.astype(np.float32))
+        (figure,) = find_figures(scene, np.zeros((0, 2)))
+        return look_of(scene, figure.seen, figure.top), figure.seen.width
+
+    whole, _ = seen(1.0)
+    beside, wide = seen(0.02 if head else -0.12)
+    assert wide < 0.3
+    assert beside.top is None  # there may be more of him beyond
+    assert whole.top is not None
+    assert alike(beside, whole) > 0.95
+
+
 def test_a_view_without_common_parts_says_nothing():
     view = look(RED)
     empty = View(np.zeros_like(view.roots), np.zeros_like(view.area), view.color, None)
@@ -1535,6 +1561,27 @@ def test_who_comes_in_far_larger_than_who_was_chosen_passes_before_the_target(
         if track.box is not None and i:
             break
     assert (track.box is None) == near
+
+
+@pytest.mark.parametrize('walked', [True, False])
+def test_who_was_chosen_far_off_may_have_come_near_since(
+    walked: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """He is three times as high: a frame a second, he has walked for three; else he passes."""
+    look = Look(Someone(-2.1, 4.4).box, 0.95, 0.95, None)
+    monkeypatch.setattr(ByLook, 'step', lambda *args: look)
+    tracker = create_tracker('metric')
+    for i in range(4):
+        one = Someone(-0.58, 1.3) if i == 3 else Someone(-2.1, 4.4)
+        color, depth = images([one])
+        depth[:, :40] = np.nan
+        stamp = round((1.0 if walked else 0.1) * 1e9 * i)
+        frame = Frame(color, depth, stamp, CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    shown = one.box.clipped(COLS, ROWS)
+    assert track.box is not None
+    assert shown is not None
+    assert (track.box.iou(shown) > 0.8) == walked
 
 
 @pytest.mark.parametrize(('pace', 'own'), [(1.2, True), (1.2, False), (5.0, True)])

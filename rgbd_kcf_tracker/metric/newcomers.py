@@ -13,7 +13,7 @@ import math
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
-from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.decide.account import STATURE, Account
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -31,10 +31,12 @@ shoulders of somebody in view from head to foot. Less is a strip of the room tha
 MOST_TALLER = 2.0
 """Times the height of the target's box, where neither end of that is the image's, that a newcomer's
 outline has at the most: what hid half of somebody may have gone. Who is larger is nearer, and
-passes before the target."""
+passes before the target, unless that has come nearer since it was chosen."""
 WALK, WALKED = 1.4, 0.5
 """Metres a second by which that box reaches farther to both sides once the look is lost, and for
 how many seconds: depth shows somebody in a doorway when he has taken a step out of it."""
+NEAREST = 0.5
+"""Metres from which a Kinect v2 reads depth."""
 LIKELY = 0.6
 """Mean probability of his pixels' colours to be the target's, at the least: 0.5 is that of colours
 which were never seen."""
@@ -50,7 +52,7 @@ class Newcomers:
     """
 
     def __init__(self, account: Account | None, box: Box, since: float) -> None:
-        self._since = since
+        self._since, self._height = since, box.height
         self._beside: set[int] = set()
         self._ends: Sides | None = None if account is None else _ends(box, account.scene)
 
@@ -73,7 +75,9 @@ class Newcomers:
         """
         best, likest, last = None, 0.0, look.last_box
         cut = _ends(last, account.scene)
-        tallest = math.inf if cut.top or cut.bottom else MOST_TALLER * last.height
+        tallest = max(MOST_TALLER * last.height, self._grown(account))
+        if cut.top or cut.bottom:
+            tallest = math.inf
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
             person = account.people[row] if row >= 0 else None
@@ -112,6 +116,15 @@ class Newcomers:
             if look.likely(colors, seen.mask) >= LIKELY:
                 best, likest = outline, shown.iou(last)
         return best
+
+    def _grown(self, account: Account) -> float:
+        """How high a person may be by now, in pixels, who has walked to the camera all the while.
+
+        He was as high as the box in which he was chosen.
+        """
+        pixels = account.scene.view.intrinsics.fy * account.scene.view.step
+        first = STATURE * pixels / self._height
+        return STATURE * pixels / max(first - WALK * (account.time - self._since), NEAREST)
 
 
 def _reach(last: Box, scene: Scene, depth: float, unseen: float) -> Box:

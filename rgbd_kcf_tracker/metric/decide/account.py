@@ -29,6 +29,12 @@ SMALL = 0.1
 or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
 STATURE = 1.7
 """Metres of a person of mean height: most differ from it by less than half a slice of a view."""
+SEATED = 1.15
+"""Metres above the floor of the shoulders of who sits, at the most: of what ends below, beside the
+end of depth, nothing tells whether it is they."""
+UPPER = 3
+"""Rows that are a silhouette's upper end: a shoulder rises up to the end of depth, a head is
+round."""
 STEP, STEP_PER_SECOND = 0.3, 1.0
 """Metres in depth by which somebody's pixels differ, about an arm's reach, and metres a second
 that they may have moved on since the last sight: a walk."""
@@ -339,7 +345,9 @@ class Account:
 
 
 def look_of(scene: Scene, seen: Silhouette, top: float | None) -> View:
-    """The look of a silhouette, counted from where the head would be if the image ends below it.
+    """The look of a silhouette, counted from where the head would be if it is out of sight.
+
+    That is where the image ends below it, or depth does beside the upper end of what shows.
 
     Args:
         scene: the scene.
@@ -348,9 +356,12 @@ def look_of(scene: Scene, seen: Silhouette, top: float | None) -> View:
     """
     above = 0.0
     ends = scene.rim.reached(seen.left, seen.top, seen.cols.stop, seen.rows.stop, scene.view)
-    if ends.top:
-        highest = seen.highest(scene.elevation)
-        if highest is not None and highest < HEADED:
+    upper = seen.mask[:UPPER]
+    beside = (ends.left and upper[:, 0].any()) or (ends.right and upper[:, -1].any())
+    if ends.top or beside:
+        top, highest = None, seen.highest(scene.elevation)
+        least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
+        if highest is not None and least < highest < most:
             above = STATURE - highest
     return View.of(scene.view, scene.codes, seen, top, above)
 
