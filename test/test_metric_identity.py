@@ -198,6 +198,21 @@ def test_who_shows_beside_the_end_of_depth_is_compared_from_where_his_head_is(he
     assert alike(beside, whole) > 0.95
 
 
+def test_who_is_chosen_with_his_head_hidden_is_known_from_where_the_box_begins():
+    one = Someone(0.0, 3.0, RED, GREEN)
+    views = []
+    for board in (None, Box(90, 20, 60, 32)):
+        targets = TargetSet('metric')
+        color, depth = images([one], board)
+        number = targets.add(Frame(color, depth, 0, CAMERA), one.box)
+        assert targets.metric is not None
+        (view,) = targets.metric.person(number).gallery.views
+        views.append(view)
+    whole, hidden = views
+    assert hidden.total < 0.9 * whole.total
+    assert alike(hidden, whole) > 0.95
+
+
 def test_a_view_without_common_parts_says_nothing():
     view = look(RED)
     empty = View(np.zeros_like(view.roots), np.zeros_like(view.area), view.color, None)

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
     in_metres,
@@ -71,6 +71,9 @@ no chair's back reaches as high as the latter."""
 NEW_SCORE = 0.8
 """Score of a box when the target has just been found to be a newcomer: place and colours fit, but
 nothing has borne it out yet."""
+HIDDEN = 0.1, 0.8
+"""Metres of whom something hides above, from which that is no chance of where the box was drawn,
+and up to which it is a part of him: half a slice, and more than his head and chest."""
 
 
 class Follower:
@@ -196,10 +199,25 @@ class Follower:
         self.seen = seen
         if self.person is None:
             self.person = self._crowd.chosen(account, seen, self._since)
+            if account.time == self._since:
+                self._count_from(account, box, seen, self.person)
             for cue in self._cues:
                 cue.start(frame, box, self.person.number)
         self._surface = BySurface(account, seen, self.person, self._parameters, self._cues, stood)
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
+
+    def _count_from(self, account: Account, box: Box, seen: Silhouette, person: Person) -> None:
+        """Count what is known of whom something hides above from where the box begins.
+
+        Depth may not reach his head, or it is behind something; who drew the box saw it.
+        """
+        view = account.scene.view
+        above = (seen.top - box.y / view.step) * seen.depth / view.intrinsics.fy
+        hidden = person.gallery.top is None and seen.cut.any
+        if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
+            person.gallery = Gallery()
+            known = View.of(view, account.scene.codes, seen, None, above)
+            person.gallery.learn(known, account.time)
 
     def _depth_of_surface(self) -> float | None:
         return float(self._surface.motion.position[2]) if self._surface is not None else None

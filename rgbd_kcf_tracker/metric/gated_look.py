@@ -121,7 +121,7 @@ class GatedLook:
                     self.stood = Stood(place, sigma, width)
                 self.stood.seen(place, sigma, dt)
                 stood = self.stood.log_odds(place, sigma)
-            if account is not None and not self._may_have_gone(look):
+            if account is not None:
                 self._newcomers.keep(account, look.box)
             self._unseen, self._carried = 0.0, False
         else:
