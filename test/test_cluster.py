@@ -115,6 +115,24 @@ def test_parts_joined_give_the_same_bytes(serial: Path, tmp_path: Path, capsys):
     assert_same(serial, tmp_path / 'r')
 
 
+def test_a_report_that_is_joined_writes_into_no_part_by_a_link(tmp_path: Path, capsys):
+    for i in (1, 2):
+        words = [*SCENES, '--jobs', '1', '--shard', f'{i}/2', '--report', str(tmp_path / f'{i}')]
+        assert main(['evaluate', *words]) == 0
+    whole = tmp_path / 'r'
+    whole.mkdir()
+    (whole / 'runs.jsonl').symlink_to(tmp_path / '1' / 'runs.jsonl')
+    before = (tmp_path / '1' / 'runs.jsonl').read_bytes()
+    parts = [str(tmp_path / '1'), str(tmp_path / '2')]
+    capsys.readouterr()
+    assert main(['evaluate', '--merge', *parts, '--report', str(whole)]) == 2
+    assert 'runs.jsonl leads into the source' in capsys.readouterr().err
+    assert (tmp_path / '1' / 'runs.jsonl').read_bytes() == before
+    (whole / 'runs.jsonl').unlink()
+    assert main(['evaluate', '--merge', *parts, '--report', str(whole)]) == 0
+    assert (tmp_path / '1' / 'runs.jsonl').read_bytes() == before
+
+
 def test_parts_in_one_shared_folder_are_joined_in_place(serial: Path, tmp_path: Path):
     shared = str(tmp_path / 'r')
     for part in ('2/2', '1/2'):

@@ -162,10 +162,14 @@ def run(args: argparse.Namespace) -> int:
 def _merge(args: argparse.Namespace) -> int:
     """Join parts, and write the report of the whole."""
     from rgbd_kcf_tracker.evaluation.parts import join
+    from rgbd_kcf_tracker.recordings.outputs import check_held
 
     if args.dataset:
         raise ParameterError('--merge takes the folders of parts alone: their data is known')
     check_report(args.report, (), args.overwrite)
+    # The report may be one of the parts, or lie in one; of the others nothing is written to.
+    whose = args.report.resolve()
+    check_held(args.report, [p for p in args.merge if not whose.is_relative_to(p.resolve())])
     with report_folder(args.report):
         whole = join(args.merge, args.report)
         record(args.report, 'parts joined', parts=[str(place) for place in args.merge])
