@@ -29,9 +29,9 @@ SMALL = 0.1
 or lies at the feet, as a bag or a ball, and less than anybody's half hidden body."""
 STATURE = 1.7
 """Metres of a person of mean height: most differ from it by less than half a slice of a view."""
-SEATED = 1.15
-"""Metres above the floor of the shoulders of who sits, at the most: of what ends below, beside the
-end of depth, nothing tells whether it is they."""
+SEATED = 1.35
+"""Metres above the floor of the head of who sits, at the most, and of the shoulders of who stands,
+at the least: of what ends below, beside the end of depth, nothing tells whether it is a head."""
 UPPER = 3
 """Rows that are a silhouette's upper end: a shoulder rises up to the end of depth, a head is
 round."""
