@@ -399,6 +399,12 @@ def test_who_has_no_reading_and_turns_round_is_followed_and_not_who_passes_befor
     assert min(shown) > 0.1
 
 
+def test_the_size_of_who_passes_nearer_is_not_the_size_at_which_a_face_is_looked_for():
+    """His head was taken for the hidden one, which was then too small to be found again."""
+    run = follow(simulate('face', seed=233, rate_hz=10.0))
+    assert run.success > 0.9
+
+
 def test_the_distance_of_who_is_seen_and_not_read_is_believed_as_long_as_that_of_who_is_hidden():
     """A robot that follows him stood still, as nothing was said of his place."""
     tracker, last = create_tracker('metric'), 0

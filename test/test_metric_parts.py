@@ -605,35 +605,6 @@ def test_nothing_is_learned_of_what_is_refused_and_it_is_not_found_again_until_i
     assert found.ratio == pytest.approx(before.ratio, rel=0.05)
 
 
-@pytest.mark.parametrize('metres', [0.9, 3.5])
-def test_what_was_hidden_is_found_again_at_the_size_that_depth_says(metres: float):
-    """It comes back much nearer, or farther, and elsewhere."""
-    patch, wall = blobs(3, 60), blobs(8, 320) // 2
-
-    def at(i: int, depth: float | None, x: int = 60) -> Frame:
-        image, read = wall.copy(), np.full(wall.shape[:2], 5.0, np.float32)
-        if depth is not None:
-            side = round(60 * 2.0 / depth)
-            place = slice(160 - side // 2, 160 - side // 2 + side), slice(x, x + side)
-            image[place] = cv2.resize(patch, (side, side), interpolation=cv2.INTER_AREA)
-            read[place] = depth
-        return Frame(image, read, i * 100_000_000)
-
-    look = ByLook(at(0, 2.0), Box(60, 130, 60, 60), MetricParameters())
-    for i in range(1, 20):
-        frame = at(i, 2.0 if i < 5 else None)
-        found = look.step(frame, 0.1)
-        assert (found is not None) == (i < 5)
-        if found is not None:
-            look.take(frame, found, 0.1)
-            look.settle()
-    found = look.step(at(20, metres, 180), 0.1)
-    assert found is not None
-    side = 60 * 2.0 / metres
-    assert found.box.iou(Box(180, 160 - side / 2, side, side)) > 0.7
-    assert found.depth == pytest.approx(metres)
-
-
 def test_who_asks_for_colours_gets_what_was_put_off_as_well():
     wall, box, mask = np.full((300, 300, 3), 90, np.uint8), Box(130, 130, 60, 60), np.ones((60, 60))
     frames = []

@@ -189,7 +189,7 @@ class ByLook:
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
-            sighting = self._look_at(frame, small, self._cx, self._cy, self._scale)
+            sighting = self._look_at(frame, small, self._cx, self._cy)
             if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
@@ -211,7 +211,9 @@ class ByLook:
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
         self.last_box, self._unseen = look.box, 0.0
-        if look.depth is None or as_near(look.depth, self.last_depth):
+        # What looks unlike may be another: the size that it has is not the target's.
+        believed = look.ratio > self._parameters.seen_ratio
+        if believed and (look.depth is None or as_near(look.depth, self.last_depth)):
             self._sure = self._scale, self._depth
         self.last_depth = look.depth
         self._put_off = partial(self._taken, frame, look, dt)
@@ -358,47 +360,25 @@ class ByLook:
 
     @property
     def _size(self) -> tuple[float, float]:
-        return self._size_at(self._scale)
+        return self._appearance.width * self._scale, self._appearance.height * self._scale
 
-    def _size_at(self, scale: float) -> tuple[float, float]:
-        return self._appearance.width * scale, self._appearance.height * scale
-
-    def _look_at(self, frame: Frame, small: Image, cx: float, cy: float, scale: float) -> Sighting:
+    def _look_at(self, frame: Frame, small: Image, cx: float, cy: float) -> Sighting:
         """Look about a place; what stood there while the target was elsewhere is not seen."""
-        possible = self._possible(frame, cx, cy, scale)
-        sighting = self._appearance.look(frame.color, cx, cy, scale, possible)
-        box = Box.from_center(sighting.cx, sighting.cy, *self._size_at(scale))
+        possible = self._possible(frame, cx, cy)
+        sighting = self._appearance.look(frame.color, cx, cy, self._scale, possible)
+        box = Box.from_center(sighting.cx, sighting.cy, *self._size)
         if self._elsewhere.unchanged(small, box.over(_step_of(frame))):
             return dataclasses.replace(sighting, peak=0.0, ratio=0.0)
         return sighting
 
-    def _scale_at(self, frame: Frame, likely: Mask, rows: slice, cols: slice) -> float:
-        """The size that the target has at a place, by the depth of what has its colours there.
-
-        Args:
-            frame: the frame.
-            likely: where the image of :func:`_small` has its colours.
-            rows: of that, about the place.
-            cols: likewise.
-        """
-        if frame.depth is None or self._first_depth is None:
-            return self._scale
-        step = _step_of(frame)
-        depth = frame.depth[step // 2 :: step, step // 2 :: step][rows, cols][likely[rows, cols]]
-        read = depth[is_reading(depth)]
-        if read.size <= MOST * depth.size:
-            return self._scale
-        scale = self._first_depth / float(np.median(read)) * self._zoom
-        return float(np.clip(scale, *SCALE_RANGE))
-
-    def _possible(self, frame: Frame, cx: float, cy: float, scale: float) -> Mask | None:
+    def _possible(self, frame: Frame, cx: float, cy: float) -> Mask | None:
         """The cells of a window about ``cx, cy`` about which something is as near as the target.
 
         Those without a reading are, too. None where its own depth is not known.
         """
         if frame.depth is None or self._depth is None:
             return None
-        columns, rows = self._appearance.cells(cx, cy, scale)
+        columns, rows = self._appearance.cells(cx, cy, self._scale)
         u = np.clip(columns, 0, frame.width - 1).astype(np.intp)
         v = np.clip(rows, 0, frame.height - 1).astype(np.intp)
         depth = frame.depth[np.ix_(v, u)]
@@ -409,8 +389,7 @@ class ByLook:
         return about
 
     def _depth_of(self, frame: Frame, sighting: Sighting) -> float | None:
-        size = self._size_at(sighting.scale)
-        return depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *size))
+        return depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *self._size))
 
     def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.
@@ -418,7 +397,7 @@ class ByLook:
         The cost is the same whatever the image shows: a fixed number of windows is looked into.
         """
         if best is None:
-            best = self._look_at(frame, small, self._cx, self._cy, self._scale)
+            best = self._look_at(frame, small, self._cx, self._cy)
             if best.ratio > self._parameters.seen_ratio:
                 return best
         step = _step_of(frame)
@@ -435,15 +414,9 @@ class ByLook:
             posterior, -1, (2 * width | 1, 2 * height | 1), borderType=cv2.BORDER_REPLICATE
         )
         contrast = inner - np.float32(0.7) * outer
-        likely = posterior > 0.5
         for _ in range(PEAKS):
             row, col = (int(i) for i in np.unravel_index(np.argmax(contrast), contrast.shape))
-            scale = self._scale
-            if self._hidden:  # who was seen a frame ago is as large as then
-                rows = slice(max(0, row - height // 2), row + height // 2 + 1)
-                cols = slice(max(0, col - width // 2), col + width // 2 + 1)
-                scale = self._scale_at(frame, likely, rows, cols)
-            found = self._look_at(frame, small, (col + 0.5) * step, (row + 0.5) * step, scale)
+            found = self._look_at(frame, small, (col + 0.5) * step, (row + 0.5) * step)
             if found.ratio > best.ratio:
                 best = found
             contrast[
@@ -454,7 +427,6 @@ class ByLook:
     def _found(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
         self._cx = float(np.clip(sighting.cx, 0, frame.width))
         self._cy = float(np.clip(sighting.cy, 0, frame.height))
-        self._scale = sighting.scale
         depth = depth_in(frame, Box.from_center(self._cx, self._cy, *self._size))
         self._rescale(frame, depth, sighting, dt)
         box = Box.from_center(self._cx, self._cy, *self._size)

@@ -46,14 +46,12 @@ class Sighting:
 
     Attributes:
         cx, cy: its centre in pixels of the image.
-        scale: its size there against its first one.
         peak: the filter's response there.
         ratio: ``peak`` against its own recent mean while the target was seen.
     """
 
     cx: float
     cy: float
-    scale: float
     peak: float
     ratio: float
 
@@ -184,7 +182,6 @@ class Appearance:
         return Sighting(
             read.cx + ((j + n // 2) % n - n // 2 + dx) * pixel,
             read.cy + ((i + n // 2) % n - n // 2 + dy) * pixel,
-            read.scale,
             peak,
             peak / max(self.mean_peak, 1e-6),
         )
