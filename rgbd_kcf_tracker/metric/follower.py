@@ -213,7 +213,9 @@ class Follower:
         """
         view = account.scene.view
         above = (seen.top - box.y / view.step) * seen.depth / view.intrinsics.fy
-        hidden = person.gallery.top is None and seen.cut.any
+        # Hair that gives no reading is missing from every view alike.
+        cut = seen.cut.top or seen.cut.left or seen.cut.right
+        hidden = cut and person.gallery.top is None
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
             person.gallery = Gallery()
             known = View.of(view, account.scene.codes, seen, None, above)

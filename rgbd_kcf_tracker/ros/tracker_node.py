@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
+from rgbd_kcf_tracker.ros.private import release_lifecycle_services
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
 from rgbd_kcf_tracker.ros.requests import REJECTED, Requests
 from rgbd_kcf_tracker.ros.subscriptions import (
@@ -252,12 +253,7 @@ class TrackerNode(LifecycleNode):
         """Stop the worker before the topics go, and leave nothing behind that others find."""
         self._stop_listening()
         super().destroy_node()
-        # rclpy leaves the lifecycle services to DDS until the node is garbage. While they go by and
-        # by, a node of the same name that is there has more ends of a service than others, and
-        # whoever counts them (rmw_fastrtps) never finds it. There is no public way.
-        machine = getattr(self, '_state_machine', None)
-        if machine is not None:
-            machine.destroy_when_not_in_use()
+        release_lifecycle_services(self)
 
     def _stop_listening(self) -> None:
         self._poll_timer.cancel()
