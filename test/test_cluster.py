@@ -169,6 +169,10 @@ def test_parts_of_different_runs_are_not_joined(tmp_path: Path, capsys):
     assert 'parts of different runs: their contenders differ' in capsys.readouterr().err
     assert main(['evaluate', '--merge', str(tmp_path), '--report', str(tmp_path / 'r')]) == 2
     assert 'holds no part' in capsys.readouterr().err
+    (tmp_path / 'circle').symlink_to('circle')
+    circle = str(tmp_path / 'circle')
+    assert main(['evaluate', '--merge', circle, '--report', str(tmp_path / 'r')]) == 2
+    assert 'circle holds no part' in capsys.readouterr().err
 
 
 def test_a_run_goes_on_in_another_place_where_it_was(

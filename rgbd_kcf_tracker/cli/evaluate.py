@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -168,8 +169,9 @@ def _merge(args: argparse.Namespace) -> int:
         raise ParameterError('--merge takes the folders of parts alone: their data is known')
     check_report(args.report, (), args.overwrite)
     # The report may be one of the parts, or lie in one; of the others nothing is written to.
-    whose = args.report.resolve()
-    check_held(args.report, [p for p in args.merge if not whose.is_relative_to(p.resolve())])
+    whose = Path(os.path.realpath(args.report))
+    others = [p for p in args.merge if not whose.is_relative_to(os.path.realpath(p))]
+    check_held(args.report, others)
     with report_folder(args.report):
         whole = join(args.merge, args.report)
         record(args.report, 'parts joined', parts=[str(place) for place in args.merge])

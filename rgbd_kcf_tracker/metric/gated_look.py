@@ -194,15 +194,15 @@ class GatedLook:
         outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
         return all(outline.iou(box) < OUTLINED for outline in outlines)
 
-    def _may_have_gone(self, look: Look) -> bool:
+    def _may_have_gone(self, look: Look | None) -> bool:
         """Whether what is found may be what the target has stood before, which depth cannot say."""
-        return self._look.unread and look.depth is None and look.ratio < UNSURE
+        return look is not None and self._look.unread and look.depth is None and look.ratio < UNSURE
 
     def _onto(self, account: Account, look: Look | None, dt: float) -> Box | None:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
-            gone = look is not None and self._may_have_gone(look)
-            newcomer = self._newcomers.find(account, self._look, look, dt if gone else self._unseen)
+            unseen = dt if self._may_have_gone(look) else self._unseen
+            newcomer = self._newcomers.find(account, self._look, look, unseen)
             if newcomer is not None:
                 return newcomer
         if look is None:

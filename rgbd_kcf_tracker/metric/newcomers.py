@@ -71,7 +71,7 @@ class Newcomers:
             account: of the frame.
             look: of the target.
             found: what it has found in the frame, None for nothing.
-            unseen: seconds since it was last found.
+            unseen: seconds since it was last surely found.
         """
         best, likest, last = None, 0.0, look.last_box
         cut = _ends(last, account.scene)
