@@ -65,7 +65,7 @@ class Newcomers:
         }
 
     def find(self, account: Account, look: ByLook, found: Look | None, unseen: float) -> Box | None:
-        """The outline of who may be the target, None for nobody.
+        """The outline of who is likeliest the target by colours and place, None for nobody.
 
         Args:
             account: of the frame.
@@ -108,13 +108,13 @@ class Newcomers:
                 or shown.area < LEAST_SHOWN * last.area
                 or shown.height > tallest
                 or shown.intersection(reach) < COVERED * least
-                or shown.iou(last) < likest
             ):
                 continue
             # Somebody else may come in before the target: he has other colours.
-            colors = scene.image[seen.rows, seen.cols]
-            if look.likely(colors, seen.mask) >= LIKELY:
-                best, likest = outline, shown.iou(last)
+            colored = look.likely(scene.image[seen.rows, seen.cols], seen.mask)
+            likely = colored * shown.intersection(reach) / least
+            if colored >= LIKELY and likely > likest:
+                best, likest = outline, likely
         return best
 
     def _grown(self, account: Account) -> float:
