@@ -48,6 +48,7 @@ from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.drawn import Drawn
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
@@ -1625,6 +1626,7 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
     ratio: float, monkeypatch: pytest.MonkeyPatch
 ):
     """A frame a second: the wall at the image's side was the target for a minute, at 0.9."""
+    monkeypatch.setattr(Drawn, 'unlike', lambda *args: False)  # as where not all of him is drawn
     tracker = create_tracker('metric')
     for i in range(2):
         one = Someone(-0.7 + 0.6 * i, 3.0)
@@ -1640,6 +1642,68 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
         track = tracker.update(frame)
     assert track.box is not None
     assert track.box.iou(one.box if ratio < 0.7 else chosen) > 0.9
+
+
+@pytest.mark.parametrize('gone', [True, False])
+def test_the_wall_that_somebody_stood_before_where_depth_ends_is_not_he(
+    gone: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """The look had gone over to the frame of the door in which he had stood, at 0.9."""
+    tracker = create_tracker('metric')
+    one = Someone(0.2, 4.4)
+    for i in range(4):
+        color, depth = images([one] if i == 0 or not gone else [])
+        depth[depth > 4] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        if i == 0:
+            tracker.start(frame, one.box)
+            look = Look(one.box, 0.95, 0.95, None)
+            monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+        else:
+            track = tracker.update(frame)
+            assert (track.box is None) == gone
+
+
+@pytest.mark.parametrize('gone', [True, False])
+def test_the_wall_where_somebody_walked_out_of_reach_of_depth_is_not_he(
+    gone: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """Before a camera that reads up to 4.5 m walls were those who had walked there, at 0.9."""
+    looked = []
+
+    def glance(self: ByLook, frame: Frame, box: Box, *args: object, **named: object) -> Look:
+        looked.append(box)
+        return Look(box, 0.95, 0.95, None)
+
+    monkeypatch.setattr(ByLook, 'glance', glance)
+    tracker = create_tracker('metric')
+    for i in range(14):
+        one = Someone(0.2, 3.4 + 0.1 * i)
+        color, depth = images([one] if i < 10 or not gone else [])
+        depth[depth > 4.25] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert looked
+    assert (track.box is None) == gone
+
+
+@pytest.mark.parametrize('own', [True, False])
+def test_who_was_drawn_where_depth_shows_nothing_is_known_when_he_comes_back(
+    own: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """He was lost for the rest of the recording, as nothing but his look had been known."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    for i in range(12):
+        paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
+        one = Someone(0.8 - 0.15 * max(i - 4, 0), 4.4 if i == 0 else 2.8, **paint)
+        color, depth = images([one] if i in (0, *range(4, 12)) else [])
+        depth[depth > 4] = np.nan
+        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == own
+    if track.box is not None:
+        assert track.box.iou(one.box) > 0.8
 
 
 def test_of_two_who_come_where_the_target_was_it_is_the_one_in_its_colours(

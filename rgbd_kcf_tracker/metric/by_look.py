@@ -295,8 +295,16 @@ class ByLook:
             image: ``(h, w, 3)`` uint8 BGR.
             mask: ``(h, w)`` bool with a pixel at least.
         """
+        return float(self.own(image)[mask].mean())
+
+    def own(self, image: Image) -> npt.NDArray[np.float32]:
+        """Probability of each pixel's colour to be the target's and not of what is around it.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR.
+        """
         self.settle()
-        return float(self._appearance.posterior(image)[mask].mean())
+        return self._appearance.posterior(image)
 
     def refuse(self, frame: Frame, look: Look) -> None:
         """What :meth:`step` found is something else: the target is hidden."""

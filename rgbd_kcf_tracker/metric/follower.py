@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
+from rgbd_kcf_tracker.metric.drawn import unlike, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -201,8 +202,8 @@ class Follower:
             self.person = self._crowd.chosen(account, seen, self._since)
             if account.time == self._since:
                 self._count_from(account, box, seen, self.person)
-            for cue in self._cues:
-                cue.start(frame, box, self.person.number)
+        for cue in self._cues:
+            cue.start(frame, box, self.person.number)
         self._surface = BySurface(account, seen, self.person, self._parameters, self._cues, stood)
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
 
@@ -375,6 +376,7 @@ class Follower:
                     look is not None
                     and stood >= ELSEWHERE
                     and not self._stood_there(account, look.box)
+                    and not self._unlike(account, look)
                 ):
                     surface.seen_elsewhere(view, look.box)
                     if account is not None and self.person is not None:
@@ -397,21 +399,76 @@ class Follower:
             self.person is not None and self.person.mobile and room_share(account, box) > IS_ROOM
         )
 
+    def _unlike(self, account: Account | None, look: Look) -> bool:
+        """Whether a box in which nothing is read looks unlike the person who is followed."""
+        person, surface = self.person, self._surface
+        if account is None or person is None or surface is None or self._look is None:
+            return False
+        seen = view_in(account.scene, look.box, self._look, float(surface.middle[2]))
+        return unlike(person.gallery, seen)
+
     # -- by look ----------------------------------------------------------------------------------
 
     def _by_look(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Track:
         assert self._gated is not None
         said = self._gated.step(frame, account, dt, turn)
+        if self.person is not None and (said.look is not None or said.onto is not None):
+            self._crowd.forget(self.person)
+            self.person = None
         if account is not None and said.onto is not None:
             self._lock(frame, account, said.onto, self._gated.stood)
             if self._surface is not None:
-                assert self.seen is not None
-                box = outline_box(account.scene, self.seen)
-                return self._tracked(frame, box, NEW_SCORE, self.seen.depth, self._surface.belief())
+                return self._locked(frame, account, self._surface, NEW_SCORE)
+        if account is not None and said.look is None and self._gated.lost_for > 0:
+            known = self._known_by_box(account, self._gated)
+            if known is not None:
+                seen, score = known
+                self._lock(frame, account, box_about(account.scene, seen))
+                if self._surface is not None:
+                    return self._locked(frame, account, self._surface, score)
         if said.look is None:
             return self._hidden(frame, dt)
         score = _score(said.look, said.stood)
         return self._tracked(frame, said.look.box, score, said.look.depth)
+
+    def _locked(self, frame: Frame, account: Account, surface: BySurface, score: float) -> Track:
+        """The track of the frame from which on the target is followed by its surface."""
+        assert self.seen is not None
+        box = outline_box(account.scene, self.seen)
+        return self._tracked(frame, box, score, self.seen.depth, surface.belief())
+
+    def _known_by_box(self, account: Account, gated: GatedLook) -> tuple[Silhouette, float] | None:
+        """Who has come and looks as what was drawn did, and how surely it is he."""
+        if self.person is None:
+            if gated.drawn is not None:
+                self.person = self._crowd.chosen_unseen(
+                    gated.drawn.gallery,
+                    gated.drawn.place,
+                    account.time - gated.lost_for,
+                    gated.others(account),
+                )
+            return None
+        person = self.person
+        likely: dict[int, float] = {}
+        for index in range(len(account.sights)):
+            stranger = account.stranger(person, index)
+            alike = None if stranger is None else stranger.resemblance(person.number)
+            if alike is not None:
+                likely[index] = math.exp(alike)
+        if not likely:
+            return None
+        index = max(likely, key=likely.__getitem__)
+        stranger = account.stranger(person, index)
+        assert stranger is not None
+        sight = account.sights[index]
+        against = account.against * away(account.time - person.seen_at)
+        others = math.exp(against) + account.as_others(person, index)
+        score = likely[index] / (sum(likely.values()) + others)
+        enough = self._recognised(stranger, account.time) and stranger.upright
+        if not enough or sight.figure.parted or score < EVEN:
+            return None
+        self._comeback = Comeback(person, account.time, against)
+        return sight.figure.seen, score
 
     # -- answers ----------------------------------------------------------------------------------
 

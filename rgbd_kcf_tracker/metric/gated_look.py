@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.metric.by_look import UNSURE, ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.drawn import Drawn
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
@@ -80,6 +81,7 @@ class GatedLook:
 
     Attributes:
         stood: where the target stands; None where that is not known.
+        drawn: who it is, where it is somebody of whom depth shows nothing; else None.
     """
 
     def __init__(
@@ -91,9 +93,22 @@ class GatedLook:
         self._mobile = self._carried = False
         self._about: frozenset[int] = frozenset()
         self.stood: Stood | None = None
+        self.drawn: Drawn | None = None
         if account is not None:
+            if look.unread:
+                self.drawn = Drawn.of(account.scene, box, look, account.time)
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             self._about = _people_about(account, box)
+
+    @property
+    def lost_for(self) -> float:
+        """Seconds since the target was last found; 0 while it may have come with the next frame."""
+        return self._unseen if self._unseen >= NEWCOMER else 0.0
+
+    def others(self, account: Account) -> set[int]:
+        """Numbers of those who were there before the target was chosen, or seen beside it."""
+        before = {p.number for p in account.people if p.first_seen <= self._since}
+        return (before - self._about) | self._newcomers.beside
 
     def step(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Gated:
         """Look for the target in the next ``frame``, ``dt`` seconds later.
@@ -143,7 +158,7 @@ class GatedLook:
         silent = look.depth is None and self._look.last_depth is None
         unlike = look.ratio < self._seen_ratio and not silent
         unlike = unlike and not self._goes_on(account, look)
-        reasons = (self._stands, self._taken, self._far, self._stood_elsewhere)
+        reasons = (self._stands, self._taken, self._far, self._stood_elsewhere, self._unlike)
         return unlike or any(refused(account, look) for refused in reasons)
 
     def _goes_on(self, account: Account, look: Look) -> bool:
@@ -166,6 +181,12 @@ class GatedLook:
     def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
         return self._mobile and room_share(account, look.box) > IS_ROOM
+
+    def _unlike(self, account: Account, look: Look) -> bool:
+        """Whether what has no reading looks unlike who was drawn: it is what he stood before."""
+        if self.drawn is None or look.depth is not None:
+            return False
+        return self.drawn.unlike(account.scene, look.box, self._look)
 
     def _taken(self, account: Account, look: Look) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""

@@ -49,16 +49,19 @@ class Newcomers:
         account: of the frame in which the target was chosen; None where that has no depth.
         box: the target in it.
         since: seconds of that frame.
+
+    Attributes:
+        beside: numbers of those who were seen beside it.
     """
 
     def __init__(self, account: Account | None, box: Box, since: float) -> None:
         self._since, self._height = since, box.height
-        self._beside: set[int] = set()
+        self.beside: set[int] = set()
         self._ends: Sides | None = None if account is None else _ends(box, account.scene)
 
     def keep(self, account: Account, box: Box) -> None:
         """Take where the target is: all who show beside it are others, whoever passes it later."""
-        self._beside |= {
+        self.beside |= {
             account.people[owner].number
             for owner, sight in zip(account.owner, account.sights, strict=True)
             if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
@@ -82,7 +85,7 @@ class Newcomers:
             row = account.owner[column]
             person = account.people[row] if row >= 0 else None
             known = person is not None and (
-                person.first_seen <= self._since or person.number in self._beside
+                person.first_seen <= self._since or person.number in self.beside
             )
             if known and account.looks[row, column] > 0:
                 continue

@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, Missing, 
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -163,6 +164,31 @@ class Crowd:
             self._see(account, len(account.people) - 1, piece, -1)
             other.met.add(person.number)
             person.met.add(other.number)
+
+    def chosen_unseen(
+        self, gallery: Gallery, place: FloatArray, left: float, met: Collection[int]
+    ) -> Person:
+        """Somebody who is to be followed and is away, of whom depth never showed anything.
+
+        Args:
+            gallery: how he looks.
+            place: where he may have been, ``(2,)`` metres.
+            left: seconds, when he was last seen by other means.
+            met: numbers of those who are somebody else.
+        """
+        person = self.welcome(place, left, chosen=True)
+        person.gallery = gallery.copy()
+        person.misses, person.figure = MISSES, True
+        person.area = max((view.total for view in gallery.views), default=0.0)
+        for other in self.people:
+            if other.number in met:
+                other.met.add(person.number)
+                person.met.add(other.number)
+        return person
+
+    def forget(self, person: Person) -> None:
+        """He was nobody, or is known by another number."""
+        self.people.remove(person)
 
     def explain(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""

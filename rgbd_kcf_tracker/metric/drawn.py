@@ -1,0 +1,98 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Somebody of whom depth shows nothing, known by the box that was drawn about him."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.decide.account import STATURE
+from rgbd_kcf_tracker.metric.identity.gallery import LEAST_PIXELS, SLICES, Gallery, View
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
+
+NARROW, BROAD = 6.0, 1.8
+"""Widths of a box that it is high at the most and at the least, as boxes about people who stand or
+walk are: others are about things, or parts of somebody, whose colours lie elsewhere."""
+OWN = 0.5
+"""Probability from which a pixel's colour is rather his than that of what is around him."""
+UNLIKE = -1.0
+"""Log-odds of a look in a box without a reading below which it is that of something else: so are
+nine of ten boxes on walls and doors beyond depth's reach, and hardly any on people
+(docs/metric.md)."""
+
+
+def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) -> View | None:
+    """How somebody looks of whom depth shows nothing: the pixels in a box that have his colours.
+
+    Looks are counted from the head down in metres, so that they can be compared with those of
+    whoever depth shows: of single views of real people that is nearly as telling as their outlines
+    in depth (docs/metric.md).
+
+    Args:
+        scene: of the frame.
+        box: about him, in pixels of the image.
+        look: that follows him.
+        depth: metres; None where that is not known: then as far off as who is of mean height.
+
+    Returns:
+        None where that cannot be said: his head is not in the image, or it is not known how far off
+        he is as he does not show from head to feet.
+    """
+    view, k = scene.view, scene.view.intrinsics
+    b = box.over(view.step)
+    rows, cols = view.part(b.x, b.y, b.right, b.bottom)
+    tall = rows.stop - rows.start
+    if tall < SLICES or b.y == 0:
+        return None
+    if depth is None:
+        whole = rows.start > 0 and rows.stop < view.shape[0]
+        if not whole or not BROAD * box.width < box.height < NARROW * box.width:
+            return None
+        depth = STATURE * k.fy / tall
+    mask = look.own(scene.image[rows, cols]) > OWN
+    if np.count_nonzero(mask) < LEAST_PIXELS:
+        return None
+    nowhere = Sides(left=False, top=False, right=False, bottom=False)
+    seen = Silhouette(cols.start, rows.start, mask, 0, depth, 0.0, nowhere, (0.0,) * 4)
+    return View.of(view, scene.codes, seen, None, max(-b.y, 0.0) * depth / k.fy)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """Who a box is drawn about where depth shows nothing.
+
+    Attributes:
+        gallery: how he looks.
+        place: ``(2,)`` metres across and along the floor, were he of mean height.
+    """
+
+    gallery: Gallery
+    place: FloatArray
+
+    @classmethod
+    def of(cls, scene: Scene, box: Box, look: ByLook, time: float) -> Drawn | None:
+        """Take what a box shows at ``time`` seconds; None where :func:`view_in` gives nothing."""
+        seen = view_in(scene, box, look)
+        if seen is None:
+            return None
+        gallery = Gallery()
+        gallery.learn(seen, time)
+        k, b = scene.view.intrinsics, box.over(scene.view.step)
+        middle = k.deproject(b.cx, b.cy, STATURE * k.fy / b.height)
+        return cls(gallery, scene.axes @ np.array(middle))
+
+    def unlike(self, scene: Scene, box: Box, look: ByLook) -> bool:
+        """Whether what a box shows looks like somebody else, or something."""
+        return unlike(self.gallery, view_in(scene, box, look))
+
+
+def unlike(gallery: Gallery, seen: View | None) -> bool:
+    """Whether a look is not that of who is known; a look that is None says nothing."""
+    return seen is not None and gallery.log_odds(seen) < UNLIKE
