@@ -6,8 +6,8 @@
     python -m rgbd_kcf_tracker.bench.reach filinha/ --fps 5 --intrinsics FX,FY,CX,CY --out reach/
 
 writes ``reach/filinha``, where nothing farther than 4.5 m is read: so far a Kinect v2 measures by
-its specification, and libfreenect2 and the drivers above it leave out what is farther unless they
-are told otherwise. Walls are gone then, and who walks there is seen in colour alone.
+its specification, and libfreenect2 leaves out what is farther unless it is told otherwise
+(``Freenect2Device::Config``). Walls are gone then, and who walks there is seen in colour alone.
 """
 
 from __future__ import annotations
