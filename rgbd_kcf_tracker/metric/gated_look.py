@@ -102,7 +102,7 @@ class GatedLook:
 
     @property
     def lost_for(self) -> float:
-        """Seconds since the target was last found; 0 while it may have come with the next frame."""
+        """Seconds since the target was last found, from :data:`NEWCOMER` on; 0 before."""
         return self._unseen if self._unseen >= NEWCOMER else 0.0
 
     def others(self, account: Account) -> set[int]:
