@@ -1626,7 +1626,7 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
     ratio: float, monkeypatch: pytest.MonkeyPatch
 ):
     """A frame a second: the wall at the image's side was the target for a minute, at 0.9."""
-    monkeypatch.setattr(Drawn, 'unlike', lambda *args: False)  # as where not all of him is drawn
+    monkeypatch.setattr(Drawn, 'of', lambda *args: None)  # as where not all of him is drawn
     tracker = create_tracker('metric')
     for i in range(2):
         one = Someone(-0.7 + 0.6 * i, 3.0)

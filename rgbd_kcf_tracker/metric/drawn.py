@@ -23,7 +23,7 @@ walk are: others are about things, or parts of somebody, whose colours lie elsew
 OWN = 0.5
 """Probability from which a pixel's colour is rather his than that of what is around him."""
 UNLIKE = -1.0
-"""Log-odds of a look in a box without a reading below which it is that of something else: so are
+"""Log-odds below which what a look has found, where depth does not tell, is something else: so are
 nine of ten boxes on walls and doors beyond depth's reach, and hardly any on people
 (docs/metric.md)."""
 
@@ -49,7 +49,7 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
     b = box.over(view.step)
     rows, cols = view.part(b.x, b.y, b.right, b.bottom)
     tall = rows.stop - rows.start
-    if tall < SLICES or b.y == 0:
+    if tall < SLICES or b.y == 0:  # a box that ends where the image does was cut off there
         return None
     if depth is None:
         whole = rows.start > 0 and rows.stop < view.shape[0]
@@ -88,11 +88,19 @@ class Drawn:
         middle = k.deproject(b.cx, b.cy, STATURE * k.fy / b.height)
         return cls(gallery, scene.axes @ np.array(middle))
 
-    def unlike(self, scene: Scene, box: Box, look: ByLook) -> bool:
-        """Whether what a box shows looks like somebody else, or something."""
-        return unlike(self.gallery, view_in(scene, box, look))
 
+def unlike(
+    gallery: Gallery, scene: Scene, box: Box, look: ByLook, depth: float | None = None
+) -> bool:
+    """Whether what a box shows does not look as who is known.
 
-def unlike(gallery: Gallery, seen: View | None) -> bool:
-    """Whether a look is not that of who is known; a look that is None says nothing."""
+    Args:
+        gallery: his looks.
+        scene: of the frame.
+        box: in pixels of the image.
+        look: that follows him.
+        depth: metres; None where that is not known, see :func:`view_in`: where that gives nothing,
+            nothing speaks against him.
+    """
+    seen = view_in(scene, box, look, depth)
     return seen is not None and gallery.log_odds(seen) < UNLIKE

@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
-from rgbd_kcf_tracker.metric.drawn import unlike, view_in
+from rgbd_kcf_tracker.metric.drawn import unlike
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -400,12 +400,12 @@ class Follower:
         )
 
     def _unlike(self, account: Account | None, look: Look) -> bool:
-        """Whether a box in which nothing is read looks unlike the person who is followed."""
+        """Whether what the look has found looks unlike the person who is followed."""
         person, surface = self.person, self._surface
         if account is None or person is None or surface is None or self._look is None:
             return False
-        seen = view_in(account.scene, look.box, self._look, float(surface.middle[2]))
-        return unlike(person.gallery, seen)
+        depth = float(surface.middle[2])
+        return unlike(person.gallery, account.scene, look.box, self._look, depth)
 
     # -- by look ----------------------------------------------------------------------------------
 
@@ -449,21 +449,20 @@ class Follower:
                 )
             return None
         person = self.person
-        likely: dict[int, float] = {}
+        likely: dict[int, tuple[float, Person]] = {}
         for index in range(len(account.sights)):
             stranger = account.stranger(person, index)
             alike = None if stranger is None else stranger.resemblance(person.number)
-            if alike is not None:
-                likely[index] = math.exp(alike)
+            if stranger is not None and alike is not None:
+                likely[index] = math.exp(alike), stranger
         if not likely:
             return None
-        index = max(likely, key=likely.__getitem__)
-        stranger = account.stranger(person, index)
-        assert stranger is not None
+        index = max(likely, key=lambda each: likely[each][0])
+        mine, stranger = likely[index]
         sight = account.sights[index]
         against = account.against * away(account.time - person.seen_at)
         others = math.exp(against) + account.as_others(person, index)
-        score = likely[index] / (sum(likely.values()) + others)
+        score = mine / (sum(odds for odds, _ in likely.values()) + others)
         enough = self._recognised(stranger, account.time) and stranger.upright
         if not enough or sight.figure.parted or score < EVEN:
             return None

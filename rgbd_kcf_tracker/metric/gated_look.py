@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.metric.by_look import UNSURE, ByLook, Look, as_near
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
-from rgbd_kcf_tracker.metric.drawn import Drawn
+from rgbd_kcf_tracker.metric.drawn import Drawn, unlike
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
@@ -186,7 +186,7 @@ class GatedLook:
         """Whether what has no reading looks unlike who was drawn: it is what he stood before."""
         if self.drawn is None or look.depth is not None:
             return False
-        return self.drawn.unlike(account.scene, look.box, self._look)
+        return unlike(self.drawn.gallery, account.scene, look.box, self._look)
 
     def _taken(self, account: Account, look: Look) -> bool:
         """Whether a box shows somebody who was there before the target was chosen."""

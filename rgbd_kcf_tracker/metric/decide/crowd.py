@@ -162,8 +162,7 @@ class Crowd:
             other = self.welcome(account.place(piece), account.time)
             account.people.append(other)
             self._see(account, len(account.people) - 1, piece, -1)
-            other.met.add(person.number)
-            person.met.add(other.number)
+            other.meet(person)
 
     def chosen_unseen(
         self, gallery: Gallery, place: FloatArray, left: float, met: Collection[int]
@@ -182,8 +181,7 @@ class Crowd:
         person.area = max((view.total for view in gallery.views), default=0.0)
         for other in self.people:
             if other.number in met:
-                other.met.add(person.number)
-                person.met.add(other.number)
+                other.meet(person)
         return person
 
     def forget(self, person: Person) -> None:
@@ -320,8 +318,7 @@ class Crowd:
                 newcomer.entered = sight.figure.seen.at_edge(account.scene.view, account.scene.rim)
                 for other in people if account.scene.motion is None else ():
                     if other.seen_at < time and other.out_of_reach(newcomer.place, time):
-                        other.met.add(newcomer.number)
-                        newcomer.met.add(other.number)
+                        other.meet(newcomer)
                 people.append(newcomer)
                 self._see(account, len(people) - 1, sight.figure.seen, column)
                 self._compare(account, len(people) - 1, column)
@@ -383,8 +380,7 @@ class Crowd:
         person.exchange(other, comeback.since)
         person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
         for each in self.withdraw(person, comeback):
-            each.met.add(other.number)
-            other.met.add(each.number)
+            each.meet(other)
 
     def is_furniture(self, person: Person, calm: Calm) -> None:
         """What somebody was found as turns out to be furniture: he is where nobody knows."""

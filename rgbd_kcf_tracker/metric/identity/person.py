@@ -170,6 +170,11 @@ class Person:
         distance = float(np.hypot(*(place - self.place)))
         return distance > MISPLACED + FASTEST * (time - self.seen_at)
 
+    def meet(self, other: Person) -> None:
+        """Remember for both that they are surely not the same, see :attr:`met`."""
+        self.met.add(other.number)
+        other.met.add(self.number)
+
     def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
         """Take log-odds of a sighting of this one to look like another, who is not in view.
 
