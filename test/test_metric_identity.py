@@ -2327,6 +2327,30 @@ def test_who_came_back_is_somebody_else_once_the_target_shows():
         assert track.box.iou(people[1].box) > 0.8
 
 
+@pytest.mark.parametrize('trousers', [BLACK, GREY, GREEN])
+def test_who_comes_out_where_the_target_was_hidden_is_it_until_that_shows(
+    trousers: tuple[int, int, int],
+):
+    """Within a second he was the target for good, at 1.0, and it stood beside him as nobody."""
+    targets, number, person = followed()
+    screen = Box(90, 0, 50, ROWS)
+    for i in range(3):
+        targets.update(picture([Someone(-0.1, 3.0)], 1.0 + 0.2 * i, screen))
+    for i in range(20):
+        people = [Someone(0.4 + 0.05 * i, 2.8, RED, trousers)]
+        if i >= 8 and trousers != BLACK:
+            people.append(Someone(-0.55 - 0.02 * (i - 8), 3.0))
+        track = targets.update(picture(people, 1.6 + 0.1 * i, screen))[number]
+        if 1 < i < 8:
+            assert track.box is not None
+            assert track.box.iou(people[0].box) > 0.8
+            assert (track.score > 0.9) == (trousers != GREEN)
+    assert targets.person(number) is person
+    assert track.box is not None
+    assert track.box.iou(people[-1].box) > 0.8
+    assert track.score > 0.8
+
+
 def test_what_lowers_the_score_of_who_came_back_is_among_its_cues():
     """What was shown of him was his probability before he was held against what was known."""
     targets, number, _ = followed()

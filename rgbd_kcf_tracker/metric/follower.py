@@ -12,7 +12,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
-from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
+from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
@@ -262,7 +262,13 @@ class Follower:
                 self._comeback = Comeback(self.person, account.time, against)
             surface.resume(found)
         score = 0.0 if found is None else found.probability
-        if self._comeback is not None:
+        if found is not None and self._comeback is None and self._seen_again(surface, dt):
+            assert self.person is not None
+            # All else that speaks for him now is what it is: his looks are to bear that out.
+            against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
+            self._comeback = Comeback(self.person, account.time, against)
+            self._likely(self._comeback, account, found)
+        elif self._comeback is not None:
             likely = self._likely(self._comeback, account, found)
             if found is not None:
                 score *= likely.score
@@ -290,6 +296,16 @@ class Follower:
 
     def _doubt(self, cue: str, found: Candidate, score: float) -> None:
         self.doubts[cue] = logit(score) - logit(found.probability)
+
+    def _seen_again(self, surface: BySurface, dt: float) -> bool:
+        """Whether the target was not seen for a while, and somebody else may be taken for it now.
+
+        He is held against what was known of it before, if that is more than a part: most of one of
+        whom only a part is known looks otherwise.
+        """
+        unseen = surface.hidden_for > 0 or dt > REUNION
+        person = self.person
+        return unseen and person is not None and person.figure and person.gallery.whole
 
     def _likely(self, comeback: Comeback, account: Account, found: Candidate | None) -> Likely:
         """Whether a returned target is the target, by what was known before it left."""

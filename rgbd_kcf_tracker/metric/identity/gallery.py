@@ -314,6 +314,11 @@ class Gallery:
         self._tops: list[tuple[float, float]] = []
         self._largest = 0.0
 
+    @property
+    def whole(self) -> bool:
+        """Whether one of the views shows all of him."""
+        return self._largest >= WHOLE_AREA
+
     def log_odds(self, view: View, alike: float | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
 
