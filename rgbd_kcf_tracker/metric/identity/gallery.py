@@ -48,6 +48,9 @@ STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.62, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
 alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
+EVEN_GREY = 0.84
+"""Where it is even before a camera without colour: there all are more alike by as much. Fitted on
+the same people without their colours, as is the steepness, which comes out the same."""
 SUREST_SAME, SUREST_OTHER, SUREST_PART = 4.0, -4.0, 3.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round; and the
 most that the least part can say for somebody, as more things look like a small one."""
@@ -88,12 +91,14 @@ class View:
         area: ``(SLICES,)`` float32 square metres that show.
         color: ``(SLICES,)`` float32, how colourful each slice is, at least 1.
         top: metres above the floor of the head's top, None where it is hidden or no floor known.
+        grey: whether the camera sees no colours.
     """
 
     roots: Floats
     area: Floats
     color: Floats
     top: float | None
+    grey: bool = False
 
     @classmethod
     def of(
@@ -136,6 +141,7 @@ class View:
             area.astype(np.float32),
             np.maximum(color, 1).astype(np.float32),
             top,
+            codes.grey,
         )
 
     @cached_property
@@ -251,7 +257,7 @@ def similarity(view: View, looks: Looks) -> Floats:
     return Compared.of(view, looks).similarity()
 
 
-def look_log_odds(alike: float, area: float, views: int = 1) -> float:
+def look_log_odds(alike: float, area: float, views: int = 1, grey: bool = False) -> float:
     """Log-odds that a view is of the person, from its likeness to the most alike view of his.
 
     Args:
@@ -259,8 +265,10 @@ def look_log_odds(alike: float, area: float, views: int = 1) -> float:
         area: square metres that show of the view, or of the largest that it was compared with,
             whichever is less.
         views: how many views of his it was compared with.
+        grey: whether the camera sees no colours.
     """
-    odds = STEEPNESS * (alike - EVEN - EVEN_PER_VIEW * math.log2(views))
+    even = (EVEN_GREY if grey else EVEN) + EVEN_PER_VIEW * math.log2(views)
+    odds = STEEPNESS * (alike - even)
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
     told = min(1.0, area / (TELLING_AREA if odds > 0 else WHOLE_AREA))
     most = SUREST_PART + (SUREST_SAME - SUREST_PART) * told
@@ -283,7 +291,7 @@ def _normal(x: float, sigma: float) -> float:
 def same_person(first: View, second: View) -> float:
     """Probability that two sightings show the same person, 0 to 1; 0.5 where they say nothing."""
     alike = float(similarity(first, Looks.of([second]))[0])
-    odds = look_log_odds(alike, min(first.total, second.total))
+    odds = look_log_odds(alike, min(first.total, second.total), grey=first.grey)
     odds += height_log_odds(first.top, second.top)
     return float(1 / (1 + np.exp(-odds)))
 
@@ -345,7 +353,7 @@ class Gallery:
         odds = height_log_odds(view.top, self.top)
         if alike is None:
             return odds
-        return odds + look_log_odds(alike, min(view.total, self._largest), views)
+        return odds + look_log_odds(alike, min(view.total, self._largest), views, view.grey)
 
     def learn_height(self, top: float, time: float) -> None:
         """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""

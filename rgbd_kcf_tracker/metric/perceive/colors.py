@@ -12,6 +12,8 @@ from a dark doorway to the window becomes somebody else.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +28,9 @@ DARKEST = 20.0
 """Added to each channel before the logarithm: what is darker than this is mostly noise."""
 STEEPNESS = 3.0
 """Of the tint levels: clothes have little tint, so the levels lie close about grey."""
+COLORLESS, STRIDE = 3, 5
+"""Levels of 255 by which the channels of a picture without colours differ at the most, where JPEG
+has rounded them, and the rows and columns of which one is read for that."""
 _STEPS = 32
 """Steps of the logarithm for each factor of e: finer than the levels by far."""
 
@@ -99,6 +104,13 @@ class ColorCodes:
     def __init__(self, image: npt.NDArray[np.uint8]) -> None:
         self._image = image
         self._made: dict[tuple[int, int, int, int], npt.NDArray[np.int32]] = {}
+
+    @cached_property
+    def grey(self) -> bool:
+        """Whether the camera sees no colours, as one of infrared light."""
+        blue, green, red = cv2.split(self._image[::STRIDE, ::STRIDE])
+        apart = max(cv2.norm(green, other, cv2.NORM_INF) for other in (blue, red))
+        return bool(apart <= COLORLESS)
 
     def __getitem__(self, part: tuple[slice, slice]) -> npt.NDArray[np.int32]:
         """Those of some rows and columns, ``(h, w)``; the same array for whoever asks."""

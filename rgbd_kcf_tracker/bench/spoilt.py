@@ -1,0 +1,187 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Copies of recordings as a worse camera gives them: what of a figure hangs on a good one.
+
+    python -m rgbd_kcf_tracker.bench.spoilt hall/ --how reach --out spoilt/
+
+writes ``spoilt/hall``, where nothing farther than 4.5 m is read: so far a Kinect v2 measures by
+its specification, and libfreenect2 leaves out what is farther unless it is told otherwise
+(``Freenect2Device::Config``). ``--help`` lists the other ways, of which some take an amount, as
+``--how lost=0.5``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rgbd_kcf_tracker.arrays import Floats, Image
+from rgbd_kcf_tracker.bench.altered import (
+    add_reading,
+    camera_of,
+    make_copy,
+    names_of,
+    parser_of,
+    read_with_depth,
+    write_camera,
+    write_copies,
+    write_pair,
+    write_truth,
+)
+
+HOLE = 12
+"""Pixels across of a hole in depth: about a hand at two metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One way to spoil a recording.
+
+    Attributes:
+        says: what it does, with ``{}`` for the amount.
+        usual: the amount where none is given.
+        most: the largest.
+        spoil: makes a frame's colours, ``(H, W, 3)`` BGR, and depth, ``(H, W)`` metres and 0 where
+            nothing is read, into those of the copy; None where the frame is left out.
+    """
+
+    says: str
+    usual: float
+    most: float
+    spoil: Callable[[Image, Floats, float, np.random.Generator], tuple[Image, Floats] | None]
+
+    def told(self, amount: float) -> str:
+        """What an amount of it does."""
+        return self.says.format(f'{amount:g}')
+
+
+def _reach(
+    color: Image, depth: Floats, metres: float, _: np.random.Generator
+) -> tuple[Image, Floats]:
+    return color, np.where(depth > metres, np.float32(0), depth)
+
+
+def _grey(
+    color: Image, depth: Floats, share: float, _: np.random.Generator
+) -> tuple[Image, Floats]:
+    grey = cv2.cvtColor(cv2.cvtColor(color, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    return cv2.addWeighted(color, 1 - share, grey, share, 0), depth
+
+
+def _lost(
+    color: Image, depth: Floats, share: float, rng: np.random.Generator
+) -> tuple[Image, Floats] | None:
+    return None if rng.random() < share else (color, depth)
+
+
+def _holes(
+    color: Image, depth: Floats, share: float, rng: np.random.Generator
+) -> tuple[Image, Floats]:
+    rows, cols = depth.shape
+    coarse = rng.random((rows // HOLE + 1, cols // HOLE + 1), np.float32)
+    chance = cv2.resize(coarse, (cols, rows))
+    return color, np.where(chance < np.quantile(chance, share), np.float32(0), depth)
+
+
+def _dark(
+    color: Image, depth: Floats, level: float, _: np.random.Generator
+) -> tuple[Image, Floats]:
+    return color, np.where(cv2.blur(color.max(axis=2), (3, 3)) < level, np.float32(0), depth)
+
+
+def _fringe(
+    color: Image, depth: Floats, pixels: float, _: np.random.Generator
+) -> tuple[Image, Floats]:
+    far = np.where(depth > 0, depth, np.float32(np.inf))
+    near = cv2.erode(far, np.ones((round(pixels), round(pixels)), np.uint8))
+    return color, np.where(np.isfinite(near), near, np.float32(0))
+
+
+def _shift(
+    color: Image, depth: Floats, pixels: float, _: np.random.Generator
+) -> tuple[Image, Floats]:
+    moved = np.array([[1, 0, pixels], [0, 1, pixels / 2]], np.float32)
+    return color, cv2.warpAffine(depth, moved, depth.shape[::-1], flags=cv2.INTER_NEAREST)
+
+
+WAYS = {
+    'reach': Way('depth ends at {} metres', 4.5, 100.0, _reach),
+    'grey': Way('{} of all colour is gone, as in infrared light', 1.0, 1.0, _grey),
+    'lost': Way('{} of the frames after the first are lost', 0.35, 0.99, _lost),
+    'holes': Way('depth has holes over {} of the picture, others in each frame', 0.25, 1.0, _holes),
+    'dark': Way('what is darker than {} of 255 gives no reading', 25.0, 255.0, _dark),
+    'fringe': Way('what is nearer is {} pixels broader in depth', 9.0, 99.0, _fringe),
+    'shift': Way('depth lies {} pixels beside the colours', 6.0, 99.0, _shift),
+}
+
+
+def _way(text: str) -> tuple[Way, float]:
+    """What was asked for, and how much of it."""
+    name, _, amount = text.partition('=')
+    way = WAYS.get(name)
+    if way is None:
+        raise argparse.ArgumentTypeError(f'{name!r} is none of {", ".join(WAYS)}')
+    try:
+        value = float(amount) if amount else way.usual
+    except ValueError:
+        value = math.nan
+    if not 0 < value <= way.most:
+        raise argparse.ArgumentTypeError(
+            f'{text!r}: the amount must be above 0, and {way.most:g} at the most'
+        )
+    return way, value
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the copies; status 2 where one cannot be made."""
+    parser = parser_of('spoilt', __doc__)
+    add_reading(parser)
+    ways = (
+        f'{name}={way.usual:g}: {way.says.format(f"{way.usual:g}")}' for name, way in WAYS.items()
+    )
+    parser.add_argument(
+        '--how', type=_way, required=True, metavar='WAY[=AMOUNT]', help='; '.join(ways)
+    )
+    parser.add_argument('--seed', type=int, default=1)
+    args = parser.parse_args(argv)
+    if args.seed < 0:
+        parser.error('--seed must be 0 or more')
+    camera = camera_of(args, parser)
+    names = names_of(args.folders, parser)
+    way, amount = args.how
+
+    def copies() -> Iterator[str]:
+        for number, (folder, name) in enumerate(zip(args.folders, names, strict=True)):
+            frames, people = read_with_depth(folder, args.fps, camera)
+            out, rng = args.out / name, np.random.default_rng([args.seed, number])
+            make_copy(out, 'rgb', 'depth')
+            kept: list[int] = []
+            for index in range(len(frames)):
+                frame = frames.frame(index)
+                assert frame.depth is not None
+                depth = np.nan_to_num(frame.depth.astype(np.float32), posinf=0.0)
+                spoilt = way.spoil(frame.color, depth, amount, rng)
+                if spoilt is None and kept:
+                    continue
+                kept.append(index)
+                write_pair(out, len(kept), *(spoilt or (frame.color, depth)))
+            write_truth(
+                out,
+                [frames.stamps_ns[index] for index in kept],
+                [people.get(index, []) for index in kept],
+            )
+            write_camera(out, frames.intrinsics)
+            yield f'{out}: {len(kept)} pairs, {way.told(amount)}'
+
+    return write_copies(args.out, args.folders, copies)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

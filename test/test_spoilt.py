@@ -1,0 +1,124 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Copies of recordings as a worse camera gives them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rgbd_kcf_tracker.bench import spoilt
+from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
+from rgbd_kcf_tracker.evaluation.datasets.base import Sample
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """A floor that goes from 1 to 7 m, with somebody in two of three frames."""
+    folder = tmp_path / 'room'
+    (folder / 'rgb').mkdir(parents=True)
+    (folder / 'depth').mkdir()
+    depth = np.broadcast_to(np.linspace(7000, 1000, 40).astype(np.uint16)[:, None], (40, 60))
+    for number in range(3):
+        color = np.full((40, 60, 3), (50 * number, 20, 20), np.uint8)
+        cv2.imwrite(str(folder / 'rgb' / f'{number}.png'), color)
+        cv2.imwrite(str(folder / 'depth' / f'{number}.png'), depth + number)
+    (folder / 'mot.txt').write_text('1,7,3,5,10,20,1,0,0,3\n3,7,9,5,10,20,1,0,0,3\n')
+    return folder
+
+
+def copied(recording: Path, tmp_path: Path, how: str) -> tuple[list[Sample], list[Sample]]:
+    """What a recording and its copy hold."""
+    out = tmp_path / 'out'
+    line = [str(recording), '--fps', '5', '--intrinsics', '50,51,29,19', '--out', str(out)]
+    assert spoilt.main([*line, '--how', how]) == 0
+    before, after = (
+        list(open_dataset(str(path), DatasetOptions(everyone=True, fps=5))[0].open().samples)
+        for path in (recording, out / 'room')
+    )
+    return before, after
+
+
+@pytest.mark.parametrize(('how', 'metres'), [('reach', 4.5), ('reach=3', 3.0)])
+def test_what_is_farther_is_not_read_and_all_else_is_as_it_was(
+    how: str, metres: float, recording: Path, tmp_path: Path
+):
+    before, after = copied(recording, tmp_path, how)
+    assert [s.frame.stamp_ns for s in after] == [s.frame.stamp_ns for s in before]
+    assert [s.people for s in after] == [s.people for s in before]
+    for old, new in zip(before, after, strict=True):
+        assert np.array_equal(old.frame.color, new.frame.color)
+        there = np.isfinite(new.frame.depth) & (new.frame.depth > 0)
+        assert np.array_equal(there, old.frame.depth <= metres)
+        assert np.allclose(new.frame.depth[there], old.frame.depth[there])
+    assert after[0].frame.intrinsics is not None
+    assert after[0].frame.intrinsics.fy == 51
+
+
+def test_frames_are_lost_and_the_others_keep_their_times(recording: Path, tmp_path: Path):
+    before, after = copied(recording, tmp_path, 'lost=0.99')
+    assert len(after) < len(before)
+    times = [s.frame.stamp_ns for s in before]
+    for new in after:
+        old = before[times.index(new.frame.stamp_ns)]
+        assert np.array_equal(old.frame.color, new.frame.color)
+        assert old.people == new.people
+
+
+@pytest.mark.parametrize('how', ['grey', 'holes=0.5', 'dark=60', 'fringe=5', 'shift=6'])
+def test_what_is_spoilt_is_what_is_said(how: str, recording: Path, tmp_path: Path):
+    before, after = copied(recording, tmp_path, how)
+    old, new = before[1].frame, after[1].frame
+    was, now = np.nan_to_num(old.depth), np.nan_to_num(new.depth)
+    assert [s.people for s in after] == [s.people for s in before]
+    if how == 'grey':
+        assert np.ptp(new.color, axis=2).max() == 0 < np.ptp(old.color, axis=2).max()
+    else:
+        assert np.array_equal(old.color, new.color)
+    if how == 'holes=0.5':
+        assert np.mean(now == 0) == pytest.approx(0.5, abs=0.05)
+        assert np.allclose(now[now > 0], was[now > 0])
+    elif how == 'dark=60':
+        assert not now.any(), 'the picture is darker than that'
+    elif how == 'fringe=5':
+        assert np.allclose(now[:-2], was[2:]), 'the floor is nearer below'
+    elif how == 'shift=6':
+        assert np.allclose(now[3:, 6:], was[:-3, :-6])
+    else:
+        assert np.array_equal(was, now)
+
+
+@pytest.mark.parametrize(
+    ('given', 'told'),
+    [
+        (['--how', 'reach=0'], 'above 0'),
+        (['--how', 'reach=nan'], 'above 0'),
+        (['--how', 'lost=1'], '0.99 at the most'),
+        (['--how', 'lost=few'], 'lost=few'),
+        (['--how', 'better'], 'reach'),
+        (['--how', 'grey', '--seed', '-1'], '--seed'),
+        (['--how', 'grey', '--intrinsics', '1,2'], '1,2'),
+    ],
+)
+def test_what_is_wrong_on_the_command_line_is_said(
+    given: list[str], told: str, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    with pytest.raises(SystemExit) as end:
+        spoilt.main([str(recording), '--out', str(tmp_path / 'out'), *given])
+    assert end.value.code == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_copy_that_is_there_is_left_alone(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+):
+    (tmp_path / 'out' / 'room').mkdir(parents=True)
+    line = [str(recording), '--how', 'grey', '--out', str(tmp_path / 'out')]
+    assert spoilt.main(line) == 2
+    assert 'is there already' in capsys.readouterr().err
+    assert not list((tmp_path / 'out' / 'room').iterdir())
