@@ -29,6 +29,7 @@ from people_rig import (
 )
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
+from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
@@ -93,11 +94,23 @@ from rgbd_kcf_tracker.track import Track
 # -- looks ----------------------------------------------------------------------------------------
 
 
+def without_colors(color: Image, quality: int = 95) -> Image:
+    """A picture as a camera of infrared light gives it, through JPEG."""
+    grey = cv2.cvtColor(cv2.cvtColor(color, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
+    return cv2.imdecode(cv2.imencode('.jpg', grey, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], 1)
+
+
 def look(
-    shirt, trousers=BLACK, z: float = 2.5, top: float | None = None, rows: float = 1.0
+    shirt,
+    trousers=BLACK,
+    z: float = 2.5,
+    top: float | None = None,
+    rows: float = 1.0,
+    grey: bool = False,
 ) -> View:
     """The view of somebody at ``z``; ``rows`` is the share from the top that is not hidden."""
     color, depth = images([Someone(0.0, z, shirt, trousers)])
+    color = without_colors(color) if grey else color
     mask = depth < WALL
     y, x = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     bottom = y[0] + round(rows * (y[-1] + 1 - y[0]))
@@ -799,6 +812,30 @@ def test_of_what_moves_or_may_have_moved_no_place_is_known(why: str):
     assert thing.log_odds(here, NARROW) == 0
 
 
+# -- a camera without colours ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('quality', [20, 95])
+def test_a_camera_without_colours_is_known_by_its_pictures(quality: int):
+    picture_of_one, _ = images([Someone(0.0, 3.0)])
+    assert ColorCodes(without_colors(picture_of_one, quality)).grey
+    assert not ColorCodes(picture_of_one).grey
+    assert look(RED, grey=True).grey
+    assert not look(RED).grey
+
+
+def test_without_colours_those_who_are_no_more_alike_than_most_are_not_the_same():
+    """Who wears a lighter shirt and trousers was he, by 50 to 1."""
+    one, same = look(RED, grey=True), look(RED, z=3.0, grey=True)
+    other = look((170, 170, 170), (85, 85, 85), grey=True)
+    gallery = Gallery()
+    gallery.learn(one, 0.0)
+    assert gallery.log_odds(same) > 2
+    assert gallery.log_odds(other) < 0
+    alike = float(similarity(other, Looks.of([one]))[0])
+    assert look_log_odds(alike, 1.0) > 3 > 0 > look_log_odds(alike, 1.0, grey=True)
+
+
 # -- who came back --------------------------------------------------------------------------------
 
 
@@ -882,6 +919,21 @@ def test_the_score_of_a_return_counts_how_seldom_anybody_comes_back_and_who_else
     likely = Comeback(person, 10.0, against).hear(red, {}, known, 10.0)
     assert likely.looks == pytest.approx(odds / (1 + odds))
     assert likely.score == pytest.approx(odds / (np.exp(against) + known + odds))
+
+
+@pytest.mark.parametrize('place', [False, True])
+def test_who_was_hidden_for_a_moment_is_somebody_else_where_place_and_looks_together_say_so(
+    place: bool,
+):
+    """By looks alone a covered chair, much like the target, was it at scores of 0.1 for good."""
+    red = look(RED)
+    person, _ = returned(red)
+    even = person.gallery.log_odds(red)
+    for odds in (-1.0, -1.2):  # a quarter is a little less than one to three
+        comeback = Comeback(person, 10.0, even - odds, place)
+        assert not comeback.denied, 'nothing was heard yet'
+        assert comeback.hear(red, {}, 0.0, 10.0).looks > 0.9
+        assert comeback.denied == (place and odds < -1.1)
 
 
 # -- everyone together ----------------------------------------------------------------------------

@@ -59,9 +59,6 @@ RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz half a second, as
 sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the disturbed copies
 (docs/metric.md)."""
-DISOWNED = 0.25
-"""Probability that who came back is the target, by looks alone, below which he is somebody else
-after all: 3 to 1, as he was taken once already, on more than this."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or
@@ -266,14 +263,14 @@ class Follower:
             assert self.person is not None
             # All else that speaks for him now is what it is: his looks are to bear that out.
             against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
-            self._comeback = Comeback(self.person, account.time, against)
+            self._comeback = Comeback(self.person, account.time, against, place=True)
             self._likely(self._comeback, account, found)
         elif self._comeback is not None:
             likely = self._likely(self._comeback, account, found)
             if found is not None:
                 score *= likely.score
                 self._doubt(KNOWN_BEFORE, found, score)
-            if likely.looks < max(DISOWNED, likely.rival):
+            if self._comeback.denied:
                 self._disown(self._comeback, account.time)
                 return self._hidden(frame, dt)
         if found is None:

@@ -25,6 +25,9 @@ as much as it takes to say the contrary
 EVEN = 0.5
 """Probability below which who came back is rather somebody else than the target: no box is shown of
 him, and what was learned of him does not stay."""
+DISOWNED = 0.25
+"""Probability that who came back is the target, by looks alone, below which he is somebody else
+after all: 3 to 1, as he was taken once already, on more than this."""
 AGAIN = 0.15
 """Seconds after which somebody is looked at again: nobody looks otherwise before."""
 
@@ -59,6 +62,8 @@ class Comeback:
         person: he, as he was known before.
         time: seconds of the return.
         against: log-odds against anybody coming back just then.
+        place: whether these are what his place says, as of one who was hidden for a moment: then it
+            counts with his looks when it is asked whether he is somebody else after all.
 
     Attributes:
         since: seconds of the return.
@@ -68,11 +73,11 @@ class Comeback:
         likely: what was heard last; None before anything was.
     """
 
-    def __init__(self, person: Person, time: float, against: float) -> None:
+    def __init__(self, person: Person, time: float, against: float, place: bool = False) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
         self.likely: Likely | None = None
-        self._new, self._settled = math.exp(against), False
+        self._new, self._settled, self._place = math.exp(against), False, place
         self._mine, self._others = _Heard(), dict[int, _Heard]()
 
     def hear(
@@ -129,6 +134,16 @@ class Comeback:
             return
         heard.tally.add(self.known.log_odds(view), view.shows**2, time)
         heard.time = time
+
+    @property
+    def denied(self) -> bool:
+        """Whether who came back is somebody else after all."""
+        likely = self.likely
+        if likely is None:
+            return False
+        if self._place and likely.score < DISOWNED:
+            return True
+        return likely.looks < max(DISOWNED, likely.rival)
 
     @property
     def odds(self) -> float:
