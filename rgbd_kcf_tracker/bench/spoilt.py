@@ -7,8 +7,8 @@
 
 writes ``spoilt/hall``, where nothing farther than 4.5 m is read: so far a Kinect v2 measures by
 its specification, and libfreenect2 leaves out what is farther unless it is told otherwise
-(``Freenect2Device::Config``). ``--help`` lists the other ways, of which some take an amount, as
-``--how lost=0.5``.
+(``Freenect2Device::Config``). ``--help`` lists the other ways and the usual amount of each;
+``--how lost=0.5`` gives another.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def _fringe(
     color: Image, depth: Floats, pixels: float, _: np.random.Generator
 ) -> tuple[Image, Floats]:
     far = np.where(depth > 0, depth, np.float32(np.inf))
-    near = cv2.erode(far, np.ones((round(pixels), round(pixels)), np.uint8))
+    side = math.ceil(pixels)
+    near = cv2.erode(far, np.ones((side, side), np.uint8))
     return color, np.where(np.isfinite(near), near, np.float32(0))
 
 
@@ -143,9 +144,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Write the copies; status 2 where one cannot be made."""
     parser = parser_of('spoilt', __doc__)
     add_reading(parser)
-    ways = (
-        f'{name}={way.usual:g}: {way.says.format(f"{way.usual:g}")}' for name, way in WAYS.items()
-    )
+    ways = (f'{name}={way.usual:g}: {way.told(way.usual)}' for name, way in WAYS.items())
     parser.add_argument(
         '--how', type=_way, required=True, metavar='WAY[=AMOUNT]', help='; '.join(ways)
     )

@@ -261,7 +261,7 @@ class Follower:
         score = 0.0 if found is None else found.probability
         if found is not None and self._comeback is None and self._seen_again(surface, dt):
             assert self.person is not None
-            # All else that speaks for him now is what it is: his looks are to bear that out.
+            # His chances are those of this frame, and only his looks change them from here on.
             against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
             self._comeback = Comeback(self.person, account.time, against, place=True)
             self._likely(self._comeback, account, found)

@@ -26,8 +26,9 @@ EVEN = 0.5
 """Probability below which who came back is rather somebody else than the target: no box is shown of
 him, and what was learned of him does not stay."""
 DISOWNED = 0.25
-"""Probability that who came back is the target, by looks alone, below which he is somebody else
-after all: 3 to 1, as he was taken once already, on more than this."""
+"""Probability that who came back is the target, by looks alone or with what his place said then,
+below which he is somebody else after all: 3 to 1, as he was taken once already, on more than
+this."""
 AGAIN = 0.15
 """Seconds after which somebody is looked at again: nobody looks otherwise before."""
 

@@ -18,6 +18,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.perceive.light import STRIDE
+
 LIGHTNESS, TINTS = 10, 7
 """Levels of lightness, and of red and blue against green each: with 8 to 14 and 7 to 13 of them
 people are told apart alike (docs/metric.md), and few are fast."""
@@ -28,9 +30,9 @@ DARKEST = 20.0
 """Added to each channel before the logarithm: what is darker than this is mostly noise."""
 STEEPNESS = 3.0
 """Of the tint levels: clothes have little tint, so the levels lie close about grey."""
-COLORLESS, STRIDE = 3, 5
+COLORLESS = 3
 """Levels of 255 by which the channels of a picture without colours differ at the most, where JPEG
-has rounded them, and the rows and columns of which one is read for that."""
+has rounded them."""
 _STEPS = 32
 """Steps of the logarithm for each factor of e: finer than the levels by far."""
 

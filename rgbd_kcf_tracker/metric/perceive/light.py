@@ -24,7 +24,7 @@ LEAST_PIXELS = 60
 median is no chance of one thing that moved."""
 STRIDE = 5
 """Rows and columns of which one is read: more than a thousand pixels remain of the view, which is
-enough for a median, and light changes no single pixel."""
+enough for a median, and neither light nor a camera without colours is told by a single pixel."""
 UNCHANGED = 0.02
 """Gain up to which nothing is done: a fraction of one of the levels that colours are told apart
 by."""
