@@ -1475,7 +1475,8 @@ def test_surface_of_a_box_is_the_one_it_is_drawn_about():
 
 
 @pytest.mark.parametrize(
-    ('left', 'wide', 'taken'), [(-1.0, 2.3, True), (-2.0, 3.3, False), (0.4, 1.2, False)]
+    ('left', 'wide', 'taken'),
+    [(-1.0, 2.3, True), (0.4, 1.2, True), (0.8, 1.2, False)],
 )
 def test_a_figure_that_lies_in_the_box_is_the_target_though_limbs_are_missing(left, wide, taken):
     watched = Watched()
@@ -1522,6 +1523,59 @@ def test_what_sticks_out_of_the_given_box_is_not_the_target():
     seen = surface_of(account, upper, MetricParameters())
     assert seen is not None
     assert box_about(account.scene, seen).iou(upper) > 0.85
+
+
+@pytest.mark.parametrize(
+    ('part', 'whole'),
+    [
+        ((0.0, 0.0, 1.0, 0.4), True),  # head and trunk
+        ((0.2, 0.2, 0.6, 0.3), True),  # the trunk alone
+        ((0.3, 0.0, 0.4, 0.16), False),  # a face
+        ((0.7, 0.3, 0.2, 0.2), False),  # a thing in his hand
+    ],
+)
+def test_who_is_drawn_by_half_is_followed_as_a_whole(part, whole: bool):
+    one = Someone(0.0, 2.5, RED)
+    x, y, width, height = part
+    b = one.box
+    drawn = Box(b.x + x * b.width, b.y + y * b.height, width * b.width, height * b.height)
+    targets = TargetSet('metric')
+    number = targets.add(picture([one], 0.0), drawn)
+    assert targets.metric is not None
+    known = targets.metric.person(number)
+    assert (known is not None) == whole
+    for i in range(1, 4):
+        one = Someone(0.3 * i, 2.5, RED)
+        track = targets.update(picture([one], 0.5 * i))[number]
+        if whole:
+            assert track.box is not None
+            assert track.box.iou(one.box) > 0.7
+
+
+@pytest.mark.parametrize('read', [True, False])
+def test_a_box_half_beside_somebody_means_him_where_nothing_else_is_there(read: bool):
+    one = Someone(0.0, 2.5)
+    color, depth = images([one])
+    b = one.box
+    if not read:  # who stands there beyond depth's reach
+        depth[20:, round(b.x) - 30 : round(b.x)] = np.nan
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    drawn = b.moved(-0.5 * b.width, 0.2 * b.height)
+    seen = surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters())
+    assert (seen is not None) == read
+    assert seen is None or box_about(scene, seen).iou(b) > 0.9
+
+
+@pytest.mark.parametrize('broad', [True, False])
+def test_what_has_no_shape_of_a_person_is_not_followed_whole_for_a_part_of_it(broad: bool):
+    depth = np.full((ROWS, COLS), WALL, np.float32)
+    depth[40:130, 60 if broad else 90 : 180 if broad else 135] = 2.5  # a cupboard, or a post
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(
+        Frame(np.full((ROWS, COLS, 3), 90, np.uint8), depth, 0, CAMERA), 0.1
+    )
+    assert scene is not None
+    drawn = Box(92, 42, 40, 34)
+    assert surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters()) is None
 
 
 def test_who_passes_before_a_half_hidden_target_is_not_taken_for_it():

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Copies of recordings as a worse camera gives them."""
+"""Copies of recordings as a worse camera or hand gives them."""
 
 from __future__ import annotations
 
@@ -122,3 +122,22 @@ def test_a_copy_that_is_there_is_left_alone(
     assert spoilt.main(line) == 2
     assert 'is there already' in capsys.readouterr().err
     assert not list((tmp_path / 'out' / 'room').iterdir())
+
+
+@pytest.mark.parametrize(
+    ('how', 'box'), [('upper', (3, 5, 10, 10)), ('inner=0.6', (5, 9, 6, 12)), ('drawn', None)]
+)
+def test_who_is_drawn_otherwise_is_in_his_first_box(how: str, box, recording: Path, tmp_path: Path):
+    before, after = copied(recording, tmp_path, how)
+    (old,), (new,) = before[0].people, after[0].people
+    assert new.id == old.id
+    assert new.box != old.box
+    if box is None:
+        assert 0.5 < new.box.iou(old.box) < 1
+    else:
+        assert new.box.as_tuple() == pytest.approx(box)
+        assert new.box.intersection(old.box) == pytest.approx(new.box.area)
+    assert [s.people for s in after[1:]] == [s.people for s in before[1:]]
+    for one, other in zip(before, after, strict=True):
+        assert np.array_equal(one.frame.color, other.frame.color)
+        assert np.array_equal(one.frame.depth, other.frame.depth, equal_nan=True)

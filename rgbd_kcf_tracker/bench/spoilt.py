@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Copies of recordings as a worse camera gives them: what of a figure hangs on a good one.
+"""Copies of recordings as a worse camera or hand gives them: what of a figure hangs on good ones.
 
     python -m rgbd_kcf_tracker.bench.spoilt hall/ --how reach --out spoilt/
 
@@ -14,6 +14,7 @@ its specification, and libfreenect2 leaves out what is farther unless it is told
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -35,6 +36,9 @@ from rgbd_kcf_tracker.bench.altered import (
     write_pair,
     write_truth,
 )
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
 
 HOLE = 12
 """Pixels across of a hole in depth: about a hand at two metres."""
@@ -50,12 +54,14 @@ class Way:
         most: the largest.
         spoil: makes a frame's colours, ``(H, W, 3)`` BGR, and depth, ``(H, W)`` metres and 0 where
             nothing is read, into those of the copy; None where the frame is left out.
+        draw: makes the first box of somebody, by which a target is given, into that of the copy.
     """
 
     says: str
     usual: float
     most: float
     spoil: Callable[[Image, Floats, float, np.random.Generator], tuple[Image, Floats] | None]
+    draw: Callable[[Box, float, np.random.Generator], Box] | None = None
 
     def told(self, amount: float) -> str:
         """What an amount of it does."""
@@ -112,6 +118,24 @@ def _shift(
     return color, cv2.warpAffine(depth, moved, depth.shape[::-1], flags=cv2.INTER_NEAREST)
 
 
+def _same(color: Image, depth: Floats, _: float, __: np.random.Generator) -> tuple[Image, Floats]:
+    return color, depth
+
+
+def _upper(box: Box, share: float, _: np.random.Generator) -> Box:
+    return dataclasses.replace(box, height=share * box.height)
+
+
+def _inner(box: Box, share: float, _: np.random.Generator) -> Box:
+    return box.scaled(share)
+
+
+def _drawn(box: Box, share: float, rng: np.random.Generator) -> Box:
+    right, down, broader, taller = (share * rng.standard_normal(4)).tolist()
+    cx, cy = box.cx + right * box.width, box.cy + down * box.height
+    return Box.from_center(cx, cy, box.width * math.exp(broader), box.height * math.exp(taller))
+
+
 WAYS = {
     'reach': Way('depth ends at {} metres', 4.5, 100.0, _reach),
     'grey': Way('{} of all colour is gone, as in infrared light', 1.0, 1.0, _grey),
@@ -120,6 +144,9 @@ WAYS = {
     'dark': Way('what is darker than {} of 255 gives no reading', 25.0, 255.0, _dark),
     'fringe': Way('what is nearer is {} pixels broader in depth', 9.0, 99.0, _fringe),
     'shift': Way('depth lies {} pixels beside the colours', 6.0, 99.0, _shift),
+    'upper': Way("targets' first boxes show the upper {} of them", 0.5, 1.0, _same, _upper),
+    'inner': Way("targets' first boxes are {} of their size", 0.5, 9.0, _same, _inner),
+    'drawn': Way("targets' first boxes are off by {} of their size", 0.1, 1.0, _same, _drawn),
 }
 
 
@@ -138,6 +165,18 @@ def _way(text: str) -> tuple[Way, float]:
             f'{text!r}: the amount must be above 0, and {way.most:g} at the most'
         )
     return way, value
+
+
+def _redrawn(
+    person: Annotation,
+    draw: Callable[[Box, float, np.random.Generator], Box],
+    amount: float,
+    rng: np.random.Generator,
+    frame: Frame,
+) -> Annotation:
+    """Somebody with another box, as far as that lies in the picture."""
+    box = draw(person.box, amount, rng).clipped(frame.width, frame.height)
+    return person if box is None else dataclasses.replace(person, box=box)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -162,6 +201,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             out, rng = args.out / name, np.random.default_rng([args.seed, number])
             make_copy(out, 'rgb', 'depth')
             kept: list[int] = []
+            truth: list[list[Annotation]] = []
+            given: set[int] = set()
             for index in range(len(frames)):
                 frame = frames.frame(index)
                 assert frame.depth is not None
@@ -171,11 +212,15 @@ def main(argv: Sequence[str] | None = None) -> int:
                     continue
                 kept.append(index)
                 write_pair(out, len(kept), *(spoilt or (frame.color, depth)))
-            write_truth(
-                out,
-                [frames.stamps_ns[index] for index in kept],
-                [people.get(index, []) for index in kept],
-            )
+                there = people.get(index, [])
+                if way.draw is not None:
+                    there = [
+                        each if each.id in given else _redrawn(each, way.draw, amount, rng, frame)
+                        for each in there
+                    ]
+                    given.update(each.id for each in there if each.counts)
+                truth.append(there)
+            write_truth(out, [frames.stamps_ns[index] for index in kept], truth)
             write_camera(out, frames.intrinsics)
             yield f'{out}: {len(kept)} pairs, {way.told(amount)}'
 

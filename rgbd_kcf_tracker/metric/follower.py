@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import surface_of
+from rgbd_kcf_tracker.metric.initialisation import fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE
@@ -120,7 +120,7 @@ class Follower:
         self.doubts: dict[str, float] = {}
         self.response: float | None = None
         if account is not None:
-            self._lock(frame, account, box)
+            box = self._lock(frame, account, box)
         self._look: ByLook | None = None
         self._gated: GatedLook | None = None
         if parameters.use_look or self._surface is None:
@@ -190,11 +190,15 @@ class Follower:
 
     # -- by surface -------------------------------------------------------------------------------
 
-    def _lock(self, frame: Frame, account: Account, box: Box, stood: Stood | None = None) -> None:
+    def _lock(self, frame: Frame, account: Account, box: Box, stood: Stood | None = None) -> Box:
+        """Follow what a box is about by its surface, if it has one; the box of that."""
         seen = surface_of(account, box, self._parameters)
         if seen is None:
-            return
+            return box
         self.seen = seen
+        outline = outline_box(account.scene, seen)
+        if not fits(outline, box):
+            box = outline  # who was drawn by half is followed as a whole
         if self.person is None:
             self.person = self._crowd.chosen(account, seen, self._since)
             if account.time == self._since:
@@ -203,6 +207,7 @@ class Follower:
             cue.start(frame, box, self.person.number)
         self._surface = BySurface(account, seen, self.person, self._parameters, self._cues, stood)
         self._partial = seen.cut.any or (SMALL < seen.area < WHOLE and seen.height > TALL)
+        return box
 
     def _count_from(self, account: Account, box: Box, seen: Silhouette, person: Person) -> None:
         """Count what is known of whom something hides above from where the box begins.
