@@ -1578,6 +1578,26 @@ def test_what_has_no_shape_of_a_person_is_not_followed_whole_for_a_part_of_it(br
     assert surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters()) is None
 
 
+def test_the_room_that_shows_where_a_target_was_from_the_first_frame_on_is_not_the_target():
+    """Nothing was known of the room when it was chosen, as part of a large surface."""
+    rng = np.random.default_rng(5)
+    pattern = cv2.resize(rng.integers(0, 255, (20, 30, 3), np.uint8), (COLS, ROWS))
+    targets = TargetSet('metric')
+
+    def frame(i: int, there: bool) -> Frame:
+        depth = np.full((ROWS, COLS), 2.8, np.float32)
+        depth[30:140, 20:220] = 2.5 if there else 2.8
+        return Frame(pattern.copy(), depth, round(5e8 * i), CAMERA)
+
+    number = targets.add(frame(0, True), Box(90, 60, 50, 50))
+    for i in range(1, 14):
+        track = targets.update(frame(i, i < 8))[number]
+        if i < 8:
+            assert track.box is not None
+        if i > 9:
+            assert track.box is None
+
+
 def test_who_passes_before_a_half_hidden_target_is_not_taken_for_it():
     target, board = Someone(0.0, 3.5), Box(80, 0, 33, 160)
     tracker = create_tracker('metric')

@@ -26,7 +26,8 @@ from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView
+from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 
 LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
@@ -91,6 +92,7 @@ class GatedLook:
         self._newcomers = Newcomers(account, box, since)
         self._agreed, self._unseen = 0, 0.0
         self._mobile = self._carried = False
+        self._began: tuple[tuple[slice, slice], DepthArray] | None = None
         self._about: frozenset[int] = frozenset()
         self.stood: Stood | None = None
         self.drawn: Drawn | None = None
@@ -98,6 +100,8 @@ class GatedLook:
             if look.unread:
                 self.drawn = Drawn.of(account.scene, box, look, account.time)
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
+            part = _part(account.scene, box)
+            self._began = part, account.scene.view.depth[part].copy()
             self._about = _people_about(account, box)
 
     @property
@@ -121,6 +125,7 @@ class GatedLook:
         """
         if account is not None:
             self._carried |= account.scene.motion is not None
+            self._mobile |= self._has_gone(account)
             if self.stood is not None:
                 self.stood.carried(account.scene.way, dt)
         look, stood = self._look.step(frame, dt, turn), 0.0
@@ -181,6 +186,20 @@ class GatedLook:
     def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""
         return self._mobile and room_share(account, look.box) > IS_ROOM
+
+    def _has_gone(self, account: Account) -> bool:
+        """Whether the room shows where the target was chosen, before anything was known of it."""
+        scene = account.scene
+        if scene.motion is not None:
+            self._began = None
+        if self._began is None or not account.settled:
+            return False
+        part, began = self._began
+        now = scene.view.depth[part]
+        if now.shape != began.shape:
+            return False
+        gone = (began > 0) & (now > began + DEPTH_STEP) & scene.still[part]
+        return bool(np.count_nonzero(gone) > (1 - IS_ROOM) * gone.size)
 
     def _unlike(self, account: Account, look: Look) -> bool:
         """Whether what has no reading looks unlike who was drawn: it is what he stood before."""

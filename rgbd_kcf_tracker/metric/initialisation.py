@@ -64,10 +64,10 @@ draw them none that finds nothing overlaps anybody by so much."""
 HEAD = 0.075
 """Square metres of a box about somebody's head, with hair and whatever little it is too large, at
 the most: faces have up to 0.045. Of so little a face may be meant, or what is held in a hand."""
-LEAST_MEANT, MOST_ELSE = 0.25, 0.5
+LEAST_MEANT, MOST_ELSE = 0.25, 0.6
 """Share of the middle of such a box that he fills at least, where it shows nothing else but what is
-behind him; and how much else, against that, it may show: of those who were meant up to 0.4,
-where somebody nearer was meant 0.8 and more."""
+behind him; and how much else, against that, it may show: of those who were meant mostly up to 0.55,
+where somebody nearer was meant 0.9 and more."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it on each side: boxes are drawn no
 better by hand, and outlines in depth lie beside those in colour. What is farther out is somebody
