@@ -13,7 +13,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.track import Track, Tracker
@@ -107,7 +107,7 @@ class TargetSet:
         Raises:
             BoxError: where nothing that could be followed is there.
         """
-        return self.add(frame, surface_at(frame, u, v))
+        return self.add(frame, target_at(frame, u, v))
 
     def remove(self, number: int) -> None:
         """No longer follow the target of that id.

@@ -15,7 +15,7 @@ import pytest
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.errors import BoxError
-from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.simulation import simulate
 
 CAMERA = Intrinsics(540, 540, 320, 240)
@@ -36,14 +36,14 @@ def blocks(*things: tuple[Box, float]) -> Frame:
 def test_a_click_anywhere_on_a_thing_gives_the_thing(place: tuple[int, int]) -> None:
     thing = Box(100, 100, 60, 160)
     frame = blocks((thing, 2.0), (Box(165, 100, 100, 200), 2.6))
-    assert surface_at(frame, *place).iou(thing) > 0.9
+    assert target_at(frame, *place).iou(thing) > 0.9
 
 
 def test_a_click_into_a_hole_takes_what_is_round_it() -> None:
     thing = Box(100, 100, 60, 160)
     frame = blocks((thing, 2.0))
     frame.depth[170:180, 125:135] = np.nan
-    assert surface_at(frame, 130, 175).iou(thing) > 0.9
+    assert target_at(frame, 130, 175).iou(thing) > 0.9
 
 
 @pytest.mark.parametrize(
@@ -61,19 +61,19 @@ def test_a_click_that_gives_no_target_says_why(u: float, v: float, words: str) -
     frame = blocks((Box(398, 298, 4, 4), 2.0))
     frame.depth[350:450, 250:350] = np.nan
     with pytest.raises(BoxError, match=words):
-        surface_at(frame, u, v)
+        target_at(frame, u, v)
 
 
 def test_a_click_on_a_piece_of_wall_is_refused() -> None:
     """It fills no more than a third of the image, and is three metres wide."""
     frame = blocks((Box(0, 260, 640, 220), 2.0), (Box(0, 0, 200, 260), 3.0))
     with pytest.raises(BoxError, match=r'3\.3 m wide and 1\.9 m high, a wall'):
-        surface_at(frame, 420, 100)
+        target_at(frame, 420, 100)
 
 
 def test_a_click_without_depth_says_what_to_do() -> None:
     with pytest.raises(BoxError, match='give a box instead'):
-        surface_at(Frame(np.zeros((480, 640, 3), np.uint8)), 10, 10)
+        target_at(Frame(np.zeros((480, 640, 3), np.uint8)), 10, 10)
 
 
 @pytest.mark.parametrize('scenario', ['normal', 'passer_by', 'mug_hand_held'])
@@ -82,10 +82,24 @@ def test_clicks_on_simulated_targets(scenario: str) -> None:
     for moment in islice(simulate(scenario, seed=4, rate_hz=3), 8):
         if moment.visible is not None and moment.visible_fraction > 0.95:
             truth = moment.visible
-            overlaps.append(surface_at(moment.frame, truth.cx, truth.y + truth.height * 0.4))
+            overlaps.append(target_at(moment.frame, truth.cx, truth.y + truth.height * 0.4))
             overlaps[-1] = overlaps[-1].iou(truth)
     assert len(overlaps) >= 3
     assert np.median(overlaps) > 0.6
+
+
+@pytest.mark.parametrize('seed', [505, 508])
+def test_a_click_on_a_leg_or_an_arm_gives_the_person(seed: int) -> None:
+    """A leg behind the other, or a bag before somebody, is a surface of its own."""
+    moment = next(iter(simulate('comers', seed=seed, rate_hz=1, size=(640, 480))))
+    people = [truth.visible for truth in moment.truths.values() if truth.visible_fraction == 1]
+    overlaps = []
+    for box in people:
+        for across, down in ((0.5, 0.4), (0.5, 0.6), (0.6, 0.5), (0.4, 0.8)):
+            where = box.x + across * box.width, box.y + down * box.height
+            overlaps.append(target_at(moment.frame, *where).iou(box))
+    assert len(overlaps) >= 8
+    assert min(overlaps) > 0.6
 
 
 def real_frames(folder: Path, step: int) -> list[tuple[int, Frame]]:
@@ -110,5 +124,5 @@ def test_clicks_on_real_people(shared_data: Path) -> None:
         boxes = [Box(*row) for row in rows if np.isfinite(row).all() and row[2] > 0]
         for other in boxes:
             people += 1
-            clicked += surface_at(frame, other.cx, other.y + 0.35 * other.height).iou(other) > 0.5
+            clicked += target_at(frame, other.cx, other.y + 0.35 * other.height).iou(other) > 0.5
     assert clicked > 0.85 * people

@@ -1,12 +1,13 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Whether a box drawn about who is half hidden starts on them."""
+"""Whether a box drawn about who is half hidden, or a click, starts on them."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rgbd_kcf_tracker.bench import starts
@@ -22,21 +23,27 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_everybody_in_every_nth_frame_is_started_on(recording: Path):
-    found = list(starts.starts(recording, 4))
+@pytest.mark.parametrize('points', [None, np.random.default_rng(1)])
+def test_everybody_in_every_nth_frame_is_started_on(recording: Path, points):
+    found = list(starts.starts(recording, 4, points))
     assert len(found) > 10
     for start in found:
         assert 0 < start.share <= 1
         assert 0.5 < start.distance < 8
-    right = [abs(s.taken - s.distance) < starts.BODY for s in found if s.share > 0.9]
-    assert sum(right) > 0.8 * len(right) > 0
+    right = [
+        s.taken is not None and abs(s.taken - s.distance) < starts.BODY
+        for s in found
+        if s.share > 0.9
+    ]
+    # Who is clicked on beside his outline is no person's there.
+    assert sum(right) > (0.8 if points is None else 0.6) * len(right) > 0
 
 
 def test_starts_are_counted_by_what_they_are_on():
     one = starts.Start(0.5, 3.0, 3.1)
     found = [one, one, starts.Start(0.5, 3.0, 2.2), starts.Start(0.5, 3.0, float('nan'))]
-    found.append(starts.Start(0.5, 3.0, 4.0))
-    assert starts.row('half', found) == ('half', 5, 20.0, 20.0, 20.0)
+    found += [starts.Start(0.5, 3.0, 4.0), *3 * [starts.Start(0.5, 3.0, None)]]
+    assert starts.row('half', found) == ('half', 8, 37.5, 12.5, 12.5, 12.5)
 
 
 def test_a_folder_that_does_not_say_who_is_how_far_off_is_refused_by_name(
@@ -60,7 +67,8 @@ def test_a_folder_that_does_not_say_who_is_how_far_off_is_refused_by_name(
 def test_the_command_prints_a_row_for_each_share(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ):
-    assert starts.main([str(recording), '--every', '12']) == 0
-    said = capsys.readouterr().out
-    assert '0.9 to 1.0' in said
-    assert 'all' in said
+    for points in ([], ['--points']):
+        assert starts.main([str(recording), '--every', '12', *points]) == 0
+        said = capsys.readouterr().out
+        assert '0.9 to 1.0' in said
+        assert 'all' in said

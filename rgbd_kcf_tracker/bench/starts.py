@@ -7,7 +7,8 @@
 
 draws the box of what shows of everybody into every twelfth frame of simulated recordings, each time
 as the first that the tracker sees, and holds the depth of what it takes for the target against that
-of the person. Where depth tells nothing the look is followed: that is no error yet.
+of the person. Where depth tells nothing the look is followed: that is no error yet. With
+``--points`` a point somewhere about the middle of that box is clicked on instead.
 """
 
 from __future__ import annotations
@@ -21,11 +22,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
+from rgbd_kcf_tracker.errors import BoxError, DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_fractions
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
+from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, read_mot
 
@@ -34,22 +38,36 @@ BODY, NOISE_PER_METRE = 0.35, 0.02
 each metre of distance."""
 SHARES = (0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.01)
 """Visible shares between which starts are counted together."""
-COLUMNS = ('visible share', 'starts', 'by look alone, %', 'on who is nearer, %', 'farther, %')
+COLUMNS = (
+    'visible share',
+    'starts',
+    'refused, %',
+    'by look alone, %',
+    'on who is nearer, %',
+    'farther, %',
+)
+OFF = 0.15
+"""Share of a box's size by which clicks deviate from its middle: nearly all lie in it."""
 
 
 class Start(NamedTuple):
     """One start: how much of the person shows, their distance and that of what was taken.
 
-    In metres; ``taken`` is NaN where depth told nothing.
+    In metres; ``taken`` is NaN where depth told nothing, and None where the start was refused.
     """
 
     share: float
     distance: float
-    taken: float
+    taken: float | None
 
 
-def starts(folder: Path, every: int) -> Iterator[Start]:
+def starts(folder: Path, every: int, points: np.random.Generator | None) -> Iterator[Start]:
     """All starts in a recording.
+
+    Args:
+        folder: the recording.
+        every: frames from one start to the next.
+        points: draws what is clicked on; None where boxes are drawn.
 
     Raises:
         RgbdKcfError: where it cannot be read, or does not say how far off anybody is.
@@ -69,20 +87,37 @@ def starts(folder: Path, every: int) -> Iterator[Start]:
     for number in range(every // 2, len(frames), every):
         frame = frames.frame(number)
         for at in np.flatnonzero((truth.frames == number) & (truth.scores > 0)).tolist():
-            targets = MetricTargets(MetricParameters())
-            taken = targets.started(targets.add(frame, truth.box(at))).depth
             share = shares[int(truth.ids[at])][number]
             distance = float(truth.positions[at, 2])
-            yield Start(share, distance, np.nan if taken is None else taken)
+            yield Start(share, distance, _taken(frame, truth.box(at), points))
+
+
+def _taken(frame: Frame, box: Box, points: np.random.Generator | None) -> float | None:
+    """Metres to what is taken for the target; NaN where depth tells nothing, None for nothing."""
+    targets = MetricTargets(MetricParameters())
+    if points is not None:
+        right, down = (OFF * points.standard_normal(2)).tolist()
+        try:
+            box = target_at(frame, box.cx + right * box.width, box.cy + down * box.height)
+        except BoxError:
+            return None
+    depth = targets.started(targets.add(frame, box)).depth
+    return np.nan if depth is None else depth
 
 
 def row(label: str, found: Sequence[Start]) -> tuple[Cell, ...]:
     """A row of the table."""
-    distance, taken = (np.array([s[n] for s in found]) for n in (1, 2))
+    refused = np.array([start.taken is None for start in found])
+    taken = np.array([start.taken for start in found], np.float64)  # of None NaN
+    distance = np.array([start.distance for start in found])
     off = taken - distance
     far = BODY + NOISE_PER_METRE * distance
-    shares = (float(100 * each.mean()) for each in (np.isnan(taken), off < -far, off > far))
-    return (label, len(found), *shares)
+    look = np.isnan(taken) & ~refused
+    return (
+        label,
+        len(found),
+        *(float(100 * n.mean()) for n in (refused, look, off < -far, off > far)),
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -95,11 +130,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         'folders', nargs='+', type=Path, metavar='FOLDER', help='simulated, of several people'
     )
     parser.add_argument('--every', type=int, default=12, help='frames from one start to the next')
+    parser.add_argument('--points', action='store_true', help='click on them instead')
     args = parser.parse_args(argv)
+    points = np.random.default_rng(1) if args.points else None
     if args.every < 1:
         parser.error('--every must be 1 or more')
     try:
-        found = [start for folder in args.folders for start in starts(folder, args.every)]
+        found = [start for folder in args.folders for start in starts(folder, args.every, points)]
     except RgbdKcfError as error:
         print(error, file=sys.stderr)
         return 2
@@ -110,7 +147,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     rows = [row(f'{low:.1f} to {min(high, 1.0):.1f}', some) for low, high, some in bands if some]
     if found:
         rows.append(row('all', found))
-    print(Table('starts', 'Who a drawn box starts on', COLUMNS, tuple(rows)).text())
+    print(Table('starts', 'Who a start is on', COLUMNS, tuple(rows)).text())
     return 0
 
 

@@ -83,10 +83,10 @@ class Requests:
 
     def init_point(self, message: PointStamped) -> None:
         """``~/init_point``: a pixel of the newest image."""
-        from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+        from rgbd_kcf_tracker.metric.pointing import target_at
 
         u, v = float(message.point.x), float(message.point.y)
-        self._choose(lambda frame: surface_at(frame, u, v))
+        self._choose(lambda frame: target_at(frame, u, v))
 
     def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """``~/reset``: drop the target."""

@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.settings import RAW
-from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.parameters import describe
 from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.evidence_messages import evidence_of
@@ -239,7 +239,7 @@ class ViewerNode(Node):
         elif command.do == 'point':
             if self.page.frame is None:
                 raise ParameterError('no picture has come yet')
-            box = surface_at(self.page.frame, values['x'], values['y'])
+            box = target_at(self.page.frame, values['x'], values['y'])
             self._add.publish(self._region(box))
         elif command.do == 'follow':
             # A new choice of one who is followed already keeps its id.

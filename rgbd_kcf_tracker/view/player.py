@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError, Rg
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.insight import Insight
-from rgbd_kcf_tracker.metric.perceive.pointing import surface_at
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.parameters import Parameters, checked, describe
 from rgbd_kcf_tracker.recordings import Recording
 from rgbd_kcf_tracker.recordings.results import HEADER, row
@@ -237,7 +237,7 @@ class Player:
         elif command.do == 'box':
             self._pick(values['frame'], lambda _: Box(*(values[n] for n in _BOX)))
         elif command.do == 'point':
-            self._pick(values['frame'], lambda frame: surface_at(frame, values['x'], values['y']))
+            self._pick(values['frame'], lambda frame: target_at(frame, values['x'], values['y']))
         elif command.do == 'follow':
             self._pick(values['frame'], lambda _: self._box_of(values['id']))
         elif command.do == 'everyone':

@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The thing a person points at: the connected surface at the depth of one pixel."""
+"""What somebody points at: the person, or else the connected surface, at one pixel."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.errors import BoxError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.surfaces import standing, surfaces_in
+from rgbd_kcf_tracker.metric.perceive.upright import upright
 
 VIEW_WIDTH = 480
 """Columns in which surfaces are looked for: a mug at two metres is still fifteen wide."""
@@ -47,8 +52,8 @@ LEAST_PIXELS = 30
 unsure as the thing is large."""
 
 
-def surface_at(frame: Frame, u: float, v: float) -> Box:
-    """The box round the connected surface at a pixel of the colour image.
+def target_at(frame: Frame, u: float, v: float) -> Box:
+    """The box round what is seen at a pixel of the colour image: the person, else the surface.
 
     Args:
         frame: with depth.
@@ -66,6 +71,33 @@ def surface_at(frame: Frame, u: float, v: float) -> Box:
     view = DepthView.of(frame, VIEW_WIDTH)
     if view is None:
         raise BoxError('a point needs depth to become a box, and there is none: give a box instead')
+    return _person_at(frame, u, v) or _surface_at(frame, view, u, v)
+
+
+def _person_at(frame: Frame, u: float, v: float) -> Box | None:
+    """The outline of the person at a pixel, None where nobody is told from the rest by his shape.
+
+    An arm before somebody, a leg or what he wears may be a surface of its own.
+    """
+    p = MetricParameters()
+    scene = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin).read(frame, 0.0)
+    if scene is None:
+        return None
+    row, column = int(v / scene.view.step), int(u / scene.view.step)
+    at = slice(row, row + 1), slice(column, column + 1)
+    near = slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2)
+    # Whoever points beside an outline means it, if the room is all that is there.
+    large = larger_than_anybody(scene.sizes)[scene.surfaces.labels[at]]
+    where = near if (large | ~scene.standing[at]).all() else at
+    for figure in find_figures(scene, np.zeros((0, 2))):
+        shows = figure.seen.in_view(scene.view.shape)[where].any()
+        if shows and upright(figure.seen, scene.view.intrinsics, figure.top):
+            return outline_box(scene, figure.seen).clipped(frame.width, frame.height)
+    return None
+
+
+def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
+    """The box round the connected surface at a pixel; raises as :func:`target_at`."""
     row, column = _nearest(view.depth > 0, v / view.step, u / view.step, NEAREST)
     if row < 0:
         raise BoxError(f'there is no depth reading near point {u:g},{v:g}: point elsewhere')
