@@ -59,8 +59,8 @@ CENTRED = 0.125
 what lies there of readings all over it. Of real and simulated starts 0.19 to 0.52 do."""
 MEANT_IOU = 0.15
 """Overlap with a person of a box by which he is meant though it fits nothing: a trunk has 0.18 and
-more, and boxes that are off by a fifth of their size 0.25. Of 400 starts on people as recordings
-draw them none that finds nothing overlaps anybody by so much."""
+more, and boxes that are off by a fifth of their size mostly 0.25. Of 400 starts on people as they
+are drawn in recordings none that finds nothing overlaps anybody by so much."""
 HEAD = 0.075
 """Square metres of a box about somebody's head, with hair and whatever little it is too large, at
 the most: faces have up to 0.045. Of so little a face may be meant, or what is held in a hand."""
