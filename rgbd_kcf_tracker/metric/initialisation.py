@@ -85,7 +85,7 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     piece = _piece_of(scene, told)
     if piece is not None and _found_again(account, piece, parameters):
         return piece
-    return behind or _scattered(scene, told) or _meant(account, told)
+    return behind or _scattered(scene, told) or _meant(account, box)
 
 
 def whole_of(account: Account, box: Box) -> Silhouette | None:
