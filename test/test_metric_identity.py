@@ -1566,6 +1566,18 @@ def test_a_box_half_beside_somebody_means_him_where_nothing_else_is_there(read: 
     assert seen is None or box_about(scene, seen).iou(b) > 0.9
 
 
+def test_who_shows_at_the_end_of_depth_is_not_meant_by_a_box_that_lies_mostly_beyond_it():
+    """In the columns that depth reaches nobody else was there."""
+    one = Someone(0.0, 2.5)
+    color, depth = images([one])
+    b = one.box
+    depth[:, : round(b.x) - 5] = np.nan
+    drawn = Box(b.x - 53, b.y, 67, b.height)
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    assert drawn.iou(b) > 0.15
+    assert surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters()) is None
+
+
 @pytest.mark.parametrize('broad', [True, False])
 def test_what_has_no_shape_of_a_person_is_not_followed_whole_for_a_part_of_it(broad: bool):
     depth = np.full((ROWS, COLS), WALL, np.float32)
