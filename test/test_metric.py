@@ -380,6 +380,8 @@ def test_a_face_chosen_on_a_body_with_which_it_is_one_surface_is_followed_by_its
         pytest.param('carried_mug', 114, 10.0, id='a mug is not what it is carried past'),
         # The account did not hear that his look was where he was: a passer got his number.
         pytest.param('missing_depth', 128, 10.0, id='who has no reading is not who walks away'),
+        # Before a wall in some of his colours, what was compared with him was that.
+        pytest.param('missing_depth', 124, 10.0, id='who has no reading is told from the wall'),
         # Depth showed a wall as before: the mug seemed to be elsewhere, and was refused for good.
         pytest.param('mug_hand_held', 113, 5.0, id='a camera is turned fast along a wall'),
     ],

@@ -49,7 +49,7 @@ from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
 from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
-from rgbd_kcf_tracker.metric.drawn import Drawn
+from rgbd_kcf_tracker.metric.drawn import Drawn, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
@@ -1823,6 +1823,76 @@ def test_the_wall_where_somebody_walked_out_of_reach_of_depth_is_not_he(
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
     assert looked
     assert (track.box is None) == gone
+
+
+def test_of_whom_depth_reads_no_more_the_room_beside_him_is_not_how_he_looks(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Where his colours are the wall's, too, he seemed to look as that does, and was hidden."""
+    own = np.ones((ROWS, COLS), np.float32)  # colours tell him from nothing
+    monkeypatch.setattr(ByLook, 'own', lambda self, image: own[: len(image), : image.shape[1]])
+    reader, one = SceneReader(COLS, 0.04, 0.03, 0.0), Someone(0.2, 2.6)
+    for i in range(4):
+        frame = picture([one], 0.1 * i)
+        scene = reader.read(frame, 0.1)
+    assert scene is not None
+    (figure,) = find_figures(scene, np.zeros((0, 2)))
+    gallery = Gallery()
+    gallery.learn(look_of(scene, figure.seen, figure.top), 0.3)
+    by_look = ByLook(frame, one.box, MetricParameters())
+    # The box of a look is as broad as his longest stride.
+    stride = Box(one.box.cx - 2 * one.box.width, one.box.y, 4 * one.box.width, one.box.height)
+    color, depth = images([one])
+    depth[depth == one.z] = np.nan
+    unread = reader.read(Frame(color, depth, round(4e8), CAMERA), 0.1)
+    assert unread is not None
+    seen = view_in(unread, stride, by_look, one.z)
+    assert seen is not None
+    assert gallery.log_odds(seen) > 3
+    # Where nobody is left the box shows nothing of him.
+    gone = reader.read(picture([], 0.5), 0.1)
+    assert gone is not None
+    assert view_in(gone, stride, by_look, one.z) is None
+
+
+def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The look of a man whom depth does not show went along with the legs of one who passed."""
+    tracker = create_tracker('metric')
+    for i in range(14):
+        one, passer = Someone(0.0, 3.0), Someone(1.4 - 0.1 * i, 2.0, GREEN, BLUE)
+        color, depth = images([one, passer])
+        depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        if i == 0:
+            tracker.start(frame, one.box)
+            continue
+        beside = passer.box.intersection(one.box) == 0
+        found = Look(one.box, 0.9, 0.9, None) if beside else Look(passer.box, 0.9, 0.9, passer.z)
+        monkeypatch.setattr(ByLook, 'step', lambda *args, found=found: found)
+        track = tracker.update(frame)
+        assert (track.box is not None) == beside
+    assert not beside
+
+
+@pytest.mark.parametrize('own', [True, False])
+def test_who_comes_where_somebody_was_drawn_looks_as_he_did(
+    own: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """By colours alone one in a green shirt was he who was drawn in a white one, at 0.99."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'likely', lambda *args: 0.9)
+    tracker = create_tracker('metric')
+    for i in range(8):
+        paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
+        one = Someone(-0.1 + 0.02 * i, 3.0, **paint)
+        color, depth = images([one] if i == 0 or i > 4 else [])
+        if i == 0:
+            depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == own
 
 
 @pytest.mark.parametrize('own', [True, False])

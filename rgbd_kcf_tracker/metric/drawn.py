@@ -11,7 +11,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook
 from rgbd_kcf_tracker.metric.decide.account import STATURE
 from rgbd_kcf_tracker.metric.identity.gallery import LEAST_PIXELS, SLICES, Gallery, View
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -30,6 +30,8 @@ nine of ten boxes on walls and doors beyond depth's reach, and hardly any on peo
 
 def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) -> View | None:
     """How somebody looks of whom depth shows nothing: the pixels in a box that have his colours.
+
+    What is read there at another depth is what he stands before.
 
     Looks are counted from the head down in metres, so that they can be compared with those of
     whoever depth shows: of single views of real people that is nearly as telling as their outlines
@@ -57,6 +59,8 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
             return None
         depth = STATURE * k.fy / tall
     mask = look.own(scene.image[rows, cols]) > OWN
+    read = view.depth[rows, cols]
+    mask &= (read == 0) | (np.abs(read - depth) < SAME_DEPTH * depth)
     if np.count_nonzero(mask) < LEAST_PIXELS:
         return None
     nowhere = Sides(left=False, top=False, right=False, bottom=False)

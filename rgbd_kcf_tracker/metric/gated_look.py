@@ -208,13 +208,15 @@ class GatedLook:
         return unlike(self.drawn.gallery, account.scene, look.box, self._look)
 
     def _taken(self, account: Account, look: Look) -> bool:
-        """Whether a box shows somebody who was there before the target was chosen."""
+        """Whether a box shows somebody who was there before the target, or beside it."""
         pixels = account.parts.kinds[_part(account.scene, look.box)]
         index = account.sight_among(account.parts.counted(pixels.ravel()))
         if index < 0 or account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
-        return owner.first_seen <= self._since and owner.number not in self._about
+        before = owner.first_seen <= self._since and owner.number not in self._about
+        # A thing may be handed over to who stands beside it; somebody is not somebody else.
+        return before or (self.drawn is not None and owner.number in self._newcomers.beside)
 
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.
@@ -242,7 +244,8 @@ class GatedLook:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
             unseen = dt if self._may_have_gone(look) else self._unseen
-            newcomer = self._newcomers.find(account, self._look, look, unseen)
+            known = None if self.drawn is None else self.drawn.gallery
+            newcomer = self._newcomers.find(account, self._look, look, unseen, known)
             if newcomer is not None:
                 return newcomer
         if look is None:

@@ -13,9 +13,11 @@ import math
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
-from rgbd_kcf_tracker.metric.decide.account import STATURE, Account
+from rgbd_kcf_tracker.metric.decide.account import STATURE, Account, Sight
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
+from rgbd_kcf_tracker.metric.drawn import UNLIKE
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Sides
 
@@ -67,7 +69,14 @@ class Newcomers:
             if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
         }
 
-    def find(self, account: Account, look: ByLook, found: Look | None, unseen: float) -> Box | None:
+    def find(
+        self,
+        account: Account,
+        look: ByLook,
+        found: Look | None,
+        unseen: float,
+        known: Gallery | None = None,
+    ) -> Box | None:
         """The outline of who is likeliest the target by colours and place, None for nobody.
 
         Args:
@@ -75,6 +84,7 @@ class Newcomers:
             look: of the target.
             found: what it has found in the frame, None for nothing.
             unseen: seconds since it was last surely found.
+            known: how it looks, where it is somebody of whom depth showed nothing.
         """
         best, likest, last = None, 0.0, look.last_box
         cut = _ends(last, account.scene)
@@ -84,12 +94,14 @@ class Newcomers:
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
             person = account.people[row] if row >= 0 else None
-            known = person is not None and (
+            met = person is not None and (
                 person.first_seen <= self._since or person.number in self.beside
             )
-            if known and account.looks[row, column] > 0:
+            if met and account.looks[row, column] > 0:
                 continue
             if sight.figure.parted:  # where it ends is a guess
+                continue
+            if known is not None and self._unlike(known, sight):
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = box_about(scene, seen)
@@ -119,6 +131,11 @@ class Newcomers:
             if colored >= LIKELY and likely > likest:
                 best, likest = outline, likely
         return best
+
+    def _unlike(self, known: Gallery, sight: Sight) -> bool:
+        """Whether somebody does not look as who was drawn, if that was all of him."""
+        in_part = self._ends is None or self._ends.any
+        return not in_part and sight.view is not None and known.log_odds(sight.view) < UNLIKE
 
     def _grown(self, account: Account) -> float:
         """How high a person may be by now, in pixels, who has walked to the camera all the while.
