@@ -1861,7 +1861,7 @@ def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
     """The look of a man whom depth does not show went along with the legs of one who passed."""
     tracker = create_tracker('metric')
     for i in range(14):
-        one, passer = Someone(0.0, 3.0), Someone(1.4 - 0.1 * i, 2.0, GREEN, BLUE)
+        one, passer = Someone(0.0, 3.0), Someone(1.4 - 0.1 * i, 2.0)  # in the same
         color, depth = images([one, passer])
         depth[depth == one.z] = np.nan
         frame = Frame(color, depth, round(1e8 * i), CAMERA)
@@ -1874,6 +1874,23 @@ def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
         track = tracker.update(frame)
         assert (track.box is not None) == beside
     assert not beside
+
+
+def test_who_passes_before_who_has_no_reading_and_looks_unlike_him_is_not_he(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The look went along with one in purple for 18 frames, at 0.9, who was never beside him."""
+    tracker = create_tracker('metric')
+    for i in range(6):
+        one, passer = Someone(0.0, 3.0), Someone(0.1 * i - 0.3, 2.0, GREEN, BLUE)
+        passes = i > 3
+        color, depth = images([one, passer] if passes else [one])
+        depth[depth == one.z] = np.nan
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        found = Look(passer.box, 0.9, 0.9, 2.0) if passes else Look(one.box, 0.9, 0.9, None)
+        monkeypatch.setattr(ByLook, 'step', lambda *args, found=found: found)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        assert (track.box is None) == passes
 
 
 @pytest.mark.parametrize('own', [True, False])

@@ -208,15 +208,20 @@ class GatedLook:
         return unlike(self.drawn.gallery, account.scene, look.box, self._look)
 
     def _taken(self, account: Account, look: Look) -> bool:
-        """Whether a box shows somebody who was there before the target, or beside it."""
+        """Whether a box shows somebody else: who was there before, or beside, or looks unlike."""
         pixels = account.parts.kinds[_part(account.scene, look.box)]
         index = account.sight_among(account.parts.counted(pixels.ravel()))
-        if index < 0 or account.owner[index] < 0:
+        if index < 0:
+            return False
+        # A thing may be handed over to whoever stands beside it; somebody is not somebody else.
+        drawn = self.drawn
+        if drawn is not None and self._newcomers.unlike(drawn.gallery, account.sights[index]):
+            return True
+        if account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
         before = owner.first_seen <= self._since and owner.number not in self._about
-        # A thing may be handed over to who stands beside it; somebody is not somebody else.
-        return before or (self.drawn is not None and owner.number in self._newcomers.beside)
+        return before or (drawn is not None and owner.number in self._newcomers.beside)
 
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.

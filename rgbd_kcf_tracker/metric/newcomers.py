@@ -101,7 +101,7 @@ class Newcomers:
                 continue
             if sight.figure.parted:  # where it ends is a guess
                 continue
-            if known is not None and self._unlike(known, sight):
+            if known is not None and self.unlike(known, sight):
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = box_about(scene, seen)
@@ -132,7 +132,7 @@ class Newcomers:
                 best, likest = outline, likely
         return best
 
-    def _unlike(self, known: Gallery, sight: Sight) -> bool:
+    def unlike(self, known: Gallery, sight: Sight) -> bool:
         """Whether somebody does not look as who was drawn, if that was all of him."""
         in_part = self._ends is None or self._ends.any
         return not in_part and sight.view is not None and known.log_odds(sight.view) < UNLIKE
