@@ -12,7 +12,6 @@ such a one comes again a moment later.
 
 from __future__ import annotations
 
-import _thread
 import signal
 import sys
 import threading
@@ -94,10 +93,11 @@ class Interrupts:
 
     def _come_again(self) -> None:
         def again() -> None:
-            if self._later > 0:  # else all has ended meanwhile
-                _thread.interrupt_main()
+            if self._later > 0 and main is not None:  # else all has ended meanwhile
+                signal.pthread_kill(main, signal.SIGINT)  # also out of what it waits for
 
         self._later -= 1
+        main = threading.main_thread().ident
         threading.Timer(_LATER_S, again).start()
 
 
