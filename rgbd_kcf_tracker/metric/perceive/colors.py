@@ -74,9 +74,10 @@ def view_image(
     rows, cols = shape
     # The exact nearest neighbours of OpenCV 4.6 are others at even steps.
     first = step // 2
-    image: npt.NDArray[np.uint8] = np.take(
-        color[first::step][:rows], np.arange(cols) * step + first, axis=1
-    )
+    taken = color[first::step, first::step][:rows, :cols]
+    image = np.empty((rows, cols, 3), np.uint8)
+    for channel in range(3):  # a third of the time of three bytes at once
+        image[..., channel] = taken[..., channel]
     return image
 
 

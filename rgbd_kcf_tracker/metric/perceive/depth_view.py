@@ -60,10 +60,10 @@ class DepthView:
         step = max(1, min(round(frame.width / width), frame.height // 2))
         half = step // 2
         depth = np.array(frame.depth[half::step, half::step])
-        if half:
-            other = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]]
-            np.copyto(depth, other, where=~is_reading(depth))
-        depth[~is_reading(depth)] = 0.0
+        missing = ~is_reading(depth)
+        found = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]][missing]
+        found[~is_reading(found)] = 0.0
+        depth[missing] = found
         k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
         return cls(
             depth,

@@ -399,40 +399,19 @@ def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatA
     rotation, shift = cv2.Rodrigues(start)[0], np.zeros(3)
     scale = FAR
     for _ in range(ITERATIONS):
-        moved = points @ rotation.T + shift
-        error = _projected(moved, k) - pixels
-        x, y, z = moved.T
-        z = np.maximum(z, NEAREST)
-        weight = 1 / (1 + np.square(error).sum(axis=1) / scale**2)
-        zero = np.zeros_like(z)
+        x, y, z = rotation @ points.T + shift[:, None]
+        near = 1 / np.maximum(z, NEAREST)
+        x, y, zero = x * near, y * near, np.zeros_like(near)
+        across, down = k.fx * x + k.cx - pixels[:, 0], k.fy * y + k.cy - pixels[:, 1]
+        weight = 1 / (1 + (across**2 + down**2) / scale**2)
         # Of the projection by a small turn (three) and shift (three) of the moved points.
-        du = np.stack(
-            (
-                -k.fx * x * y / z**2,
-                k.fx * (1 + x**2 / z**2),
-                -k.fx * y / z,
-                k.fx / z,
-                zero,
-                -k.fx * x / z**2,
-            ),
-            axis=1,
-        )
-        dv = np.stack(
-            (
-                -k.fy * (1 + y**2 / z**2),
-                k.fy * x * y / z**2,
-                k.fy * x / z,
-                zero,
-                k.fy / z,
-                -k.fy * y / z**2,
-            ),
-            axis=1,
-        )
+        du = k.fx * np.stack((-x * y, 1 + x**2, -y, near, zero, -x * near), axis=1)
+        dv = k.fy * np.stack((-1 - y**2, x * y, x, zero, near, -y * near), axis=1)
         jacobian = np.concatenate((du, dv))
         weights = np.concatenate((weight, weight))
-        residual = np.concatenate((error[:, 0], error[:, 1]))
-        normal = (jacobian * weights[:, None]).T @ jacobian + 1e-6 * np.eye(6)
-        step = np.linalg.solve(normal, -(jacobian * weights[:, None]).T @ residual)
+        residual = np.concatenate((across, down))
+        weighted = (jacobian * weights[:, None]).T
+        step = np.linalg.solve(weighted @ jacobian + 1e-6 * np.eye(6), -weighted @ residual)
         turn, _ = cv2.Rodrigues(step[:3])
         rotation = turn @ rotation
         shift = turn @ shift + step[3:]

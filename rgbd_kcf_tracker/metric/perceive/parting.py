@@ -144,12 +144,16 @@ def _farther(mask: Mask, ahead: npt.NDArray[np.float32], metres: float) -> Mask 
     values, least = ahead[::EVERY][mask[::EVERY]], LEAST_SHARE / 2
     if float(values.var()) < least * (1 - least) * BEHIND**2:  # that of the least part, so far off
         return None
-    near, far = np.percentile(values, (5, 95))
-    # The threshold on both sides of which depth varies least (Otsu, 1979).
-    count, edges = np.histogram(np.clip(values, near, far), BINS, (near, far))
+    # The threshold on both sides of which depth varies least (Otsu, 1979). Once in order, their
+    # percentiles and histogram take a quarter of the time of NumPy's.
+    values.sort()
+    total = len(values)
+    near, far = np.interp(np.array((0.05, 0.95)) * (total - 1), np.arange(total), values)
+    edges = np.linspace(near, far, BINS + 1)
+    nearer = np.searchsorted(values, edges[1:-1])
+    count = np.diff(np.concatenate(([0], nearer, [total])))
     middle = (edges[1:] + edges[:-1]) / 2
-    total, mean = len(values), float(count @ middle) / len(values)
-    nearer = np.cumsum(count)[:-1]
+    mean = float(count @ middle) / total
     off = nearer * mean - np.cumsum(count * middle)[:-1]
     apart = off * total / np.maximum(nearer * (total - nearer), 1)
     between = off * apart
