@@ -75,10 +75,12 @@ class Drawn:
     Attributes:
         gallery: how he looks.
         place: ``(2,)`` metres across and along the floor, were he of mean height.
+        whole: whether the box ends where he does, and not where depth's view does.
     """
 
     gallery: Gallery
     place: FloatArray
+    whole: bool
 
     @classmethod
     def of(cls, scene: Scene, box: Box, look: ByLook, time: float) -> Drawn | None:
@@ -90,7 +92,11 @@ class Drawn:
         gallery.learn(seen, time)
         k, b = scene.view.intrinsics, box.over(scene.view.step)
         middle = k.deproject(b.cx, b.cy, STATURE * k.fy / b.height)
-        return cls(gallery, scene.axes @ np.array(middle))
+        return cls(gallery, scene.axes @ np.array(middle), not scene.ends(box).any)
+
+    def unlike(self, view: View) -> bool:
+        """Whether a figure does not look as he does: said only if all of him was drawn."""
+        return self.whole and self.gallery.log_odds(view) < UNLIKE
 
 
 def unlike(

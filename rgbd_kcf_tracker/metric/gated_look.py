@@ -215,7 +215,7 @@ class GatedLook:
             return False
         # A thing may be handed over to whoever stands beside it; somebody is not somebody else.
         drawn = self.drawn
-        if drawn is not None and self._newcomers.unlike(drawn.gallery, account.sights[index]):
+        if drawn is not None and drawn.unlike(account.sights[index].view):
             return True
         if account.owner[index] < 0:
             return False
@@ -249,8 +249,7 @@ class GatedLook:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
             unseen = dt if self._may_have_gone(look) else self._unseen
-            known = None if self.drawn is None else self.drawn.gallery
-            newcomer = self._newcomers.find(account, self._look, look, unseen, known)
+            newcomer = self._newcomers.find(account, self._look, look, unseen, self.drawn)
             if newcomer is not None:
                 return newcomer
         if look is None:

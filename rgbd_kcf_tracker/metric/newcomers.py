@@ -13,11 +13,10 @@ import math
 
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, as_near
-from rgbd_kcf_tracker.metric.decide.account import STATURE, Account, Sight
+from rgbd_kcf_tracker.metric.decide.account import STATURE, Account
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
-from rgbd_kcf_tracker.metric.drawn import UNLIKE
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.drawn import Drawn
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Sides
 
@@ -59,7 +58,7 @@ class Newcomers:
     def __init__(self, account: Account | None, box: Box, since: float) -> None:
         self._since, self._height = since, box.height
         self.beside: set[int] = set()
-        self._ends: Sides | None = None if account is None else _ends(box, account.scene)
+        self._ends: Sides | None = None if account is None else account.scene.ends(box)
 
     def keep(self, account: Account, box: Box) -> None:
         """Take where the target is: all who show beside it are others, whoever passes it later."""
@@ -75,7 +74,7 @@ class Newcomers:
         look: ByLook,
         found: Look | None,
         unseen: float,
-        known: Gallery | None = None,
+        drawn: Drawn | None = None,
     ) -> Box | None:
         """The outline of who is likeliest the target by colours and place, None for nobody.
 
@@ -84,10 +83,10 @@ class Newcomers:
             look: of the target.
             found: what it has found in the frame, None for nothing.
             unseen: seconds since it was last surely found.
-            known: how it looks, where it is somebody of whom depth showed nothing.
+            drawn: who it is, where it is somebody of whom depth showed nothing.
         """
         best, likest, last = None, 0.0, look.last_box
-        cut = _ends(last, account.scene)
+        cut = account.scene.ends(last)
         tallest = max(MOST_TALLER * last.height, self._grown(account))
         if cut.top or cut.bottom:
             tallest = math.inf
@@ -101,11 +100,11 @@ class Newcomers:
                 continue
             if sight.figure.parted:  # where it ends is a guess
                 continue
-            if known is not None and self.unlike(known, sight):
+            if drawn is not None and drawn.unlike(sight.view):
                 continue
             seen, scene = sight.figure.seen, account.scene
             outline = box_about(scene, seen)
-            ends = _ends(outline, scene)
+            ends = scene.ends(outline)
             shown, least = _to_side(outline, ends, scene), outline.area
             in_part = self._ends is not None and (
                 (ends.left and self._ends.left) or (ends.right and self._ends.right)
@@ -132,11 +131,6 @@ class Newcomers:
                 best, likest = outline, likely
         return best
 
-    def unlike(self, known: Gallery, sight: Sight) -> bool:
-        """Whether somebody does not look as who was drawn, if that was all of him."""
-        in_part = self._ends is None or self._ends.any
-        return not in_part and sight.view is not None and known.log_odds(sight.view) < UNLIKE
-
     def _grown(self, account: Account) -> float:
         """How high a person may be by now, in pixels, who has walked to the camera all the while.
 
@@ -152,12 +146,6 @@ def _reach(last: Box, scene: Scene, depth: float, unseen: float) -> Box:
     pixels = scene.view.intrinsics.fx * scene.view.step / depth
     step = WALK * min(unseen, WALKED) * pixels
     return Box(last.x - step, last.y, last.width + 2 * step, last.height)
-
-
-def _ends(box: Box, scene: Scene) -> Sides:
-    """The sides at which a box reaches the end of what depth sees."""
-    b = box.over(scene.view.step)
-    return scene.rim.reached(b.x, b.y, b.right, b.bottom, scene.view)
 
 
 def _to_side(outline: Box, ends: Sides, scene: Scene) -> Box:

@@ -14,13 +14,14 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.frame import Frame
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
-from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, upright_people
 from rgbd_kcf_tracker.pose import Pose
@@ -86,6 +87,11 @@ class Scene:
     def sizes(self) -> Sizes:
         """Places and sizes of the surfaces."""
         return Sizes.of(self.surfaces, self.view.intrinsics)
+
+    def ends(self, box: Box) -> Sides:
+        """The sides at which a box of the image reaches the end of what depth sees."""
+        b = box.over(self.view.step)
+        return self.rim.reached(b.x, b.y, b.right, b.bottom, self.view)
 
     def silhouette(self, label: int) -> Silhouette:
         """One surface as a silhouette; the same for whoever asks."""
