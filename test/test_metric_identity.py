@@ -2522,6 +2522,23 @@ def test_the_score_of_whom_nobody_chose_says_how_surely_he_is_who_went(
         assert (track.score > 0.85) == (trousers == BLACK)
 
 
+def test_what_somebody_stood_before_in_the_first_frame_is_not_somebody_who_has_come():
+    """Boxes that he touched stayed people until the end once another had hidden a side of them."""
+    targets, z, shown = MetricTargets(MetricParameters()), 3.05, set[int]()
+    targets.everyone = True
+    rows, cols = (
+        slice(*(round(metres * CAMERA.fx / z + middle) for metres in ends))
+        for ends, middle in (((-0.05, 0.85), CAMERA.cy), ((-0.62, -0.1), CAMERA.cx))
+    )
+    for i in range(19):
+        walks, passes = Someone(0.04 * max(i - 5, 0), 3.0), Someone(-1.6 + 0.06 * i, 2.0, BLUE)
+        color, depth = images([walks, passes])
+        behind = depth[rows, cols] > z
+        color[rows, cols][behind], depth[rows, cols][behind] = GREY, z
+        shown |= set(targets.update(Frame(color, depth, i * 10**8, CAMERA)))
+    assert shown == {1, 2}
+
+
 DESK = Box(0, 95, COLS, ROWS - 95)
 """It hides the legs of whoever stands behind it."""
 

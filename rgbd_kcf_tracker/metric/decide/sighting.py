@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEADED, person_sized, upright
 
@@ -24,7 +25,9 @@ few of the slices show that others have them as well."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
 with what is behind, and feet lie as near to the floor as its depth is uncertain."""
-
+KNOWN = 0.5
+"""Share of a silhouette from which it stands before a room that is known, and not where none was
+seen yet: most of it."""
 LEAP = 0.5
 """Metres from one sight to the next from which somebody was found, not followed: more than a part
 of him is from another, and than he walks in a third of a second."""
@@ -75,7 +78,7 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
             return
     person.upright = (
         person.upright
-        or (account.settled and person_sized(seen, view.top) and came(scene, seen))
+        or (account.settled and person_sized(seen, view.top) and _came(scene, seen))
         or upright(seen, scene.view.intrinsics, view.top)
     )
     if view.top is not None and view.top > 1.2:
@@ -87,6 +90,12 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     whole = seen.area > WHOLE and headed and alone and apart
     if whole or not person.gallery.views:
         person.gallery.learn(view, account.time)
+
+
+def _came(scene: Scene, seen: Silhouette) -> bool:
+    """Whether a silhouette has come to where it is, and did not stand behind somebody before."""
+    known = scene.known[seen.rows, seen.cols][seen.mask]
+    return float(known.mean()) > KNOWN and came(scene, seen)
 
 
 def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:

@@ -51,6 +51,7 @@ class Scene:
         standing: ``(h, w)`` bool, pixels with a reading that are not floor.
         before: ``(h, w)`` bool, pixels that show something before the room.
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
+        known: ``(h, w)`` bool, where the frames before tell of the room.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
@@ -73,6 +74,7 @@ class Scene:
     standing: npt.NDArray[np.bool_]
     before: npt.NDArray[np.bool_]
     still: npt.NDArray[np.bool_]
+    known: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     image: npt.NDArray[np.uint8]
@@ -216,6 +218,7 @@ class SceneReader:
             mask,
             before,
             self.room.still,
+            self.room.known,
             surfaces,
             self._rim,
             image,
