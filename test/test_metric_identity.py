@@ -2539,6 +2539,20 @@ def test_what_somebody_stood_before_in_the_first_frame_is_not_somebody_who_has_c
     assert shown == {1, 2}
 
 
+def test_who_comes_where_depth_shows_nothing_is_somebody_without_a_head():
+    """As one who sits down before a window: what is behind him never was somebody."""
+    targets, shown = MetricTargets(MetricParameters()), set[int]()
+    targets.everyone = True
+    for i in range(12):
+        color, depth = images([])
+        depth[:, 90:150] = 0.0
+        if i > 7:
+            color[55:, 105:135], depth[55:, 105:135] = RED, 3.0
+        color[110:], depth[110:] = GREY, 1.5
+        shown |= set(targets.update(Frame(color, depth, i * 10**8, CAMERA)))
+    assert shown == {1}
+
+
 DESK = Box(0, 95, COLS, ROWS - 95)
 """It hides the legs of whoever stands behind it."""
 

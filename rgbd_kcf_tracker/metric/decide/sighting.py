@@ -25,9 +25,9 @@ few of the slices show that others have them as well."""
 PART_OF_ROOM = 0.3
 """Share of a silhouette that shows the room up to which it stands before it: outlines are mixed
 with what is behind, and feet lie as near to the floor as its depth is uncertain."""
-KNOWN = 0.5
-"""Share of a silhouette from which it stands before a room that is known, and not where none was
-seen yet: most of it."""
+VACANT = 0.5
+"""Share of a silhouette from which it stands where nobody did before, and not where somebody always
+has: most of it."""
 LEAP = 0.5
 """Metres from one sight to the next from which somebody was found, not followed: more than a part
 of him is from another, and than he walks in a third of a second."""
@@ -94,8 +94,8 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
 
 def _came(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette has come to where it is, and did not stand behind somebody before."""
-    known = scene.known[seen.rows, seen.cols][seen.mask]
-    return float(known.mean()) > KNOWN and came(scene, seen)
+    vacant = scene.vacant[seen.rows, seen.cols][seen.mask]
+    return float(vacant.mean()) > VACANT and came(scene, seen)
 
 
 def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:

@@ -164,14 +164,14 @@ class Room:
         depth: ``(h, w)`` float32 metres of the room, 0 where it is not known.
         before: ``(h, w)`` bool, the pixels of the last frame that show something before the room.
         still: ``(h, w)`` bool, those that show the room where it was in the frames before.
-        known: ``(h, w)`` bool, where these tell of the room.
+        vacant: ``(h, w)`` bool, where these have shown what is there when nobody is, be it nothing.
     """
 
     def __init__(self) -> None:
         self.depth: DepthArray = np.zeros((0, 0), np.float32)
         self.before: Mask = np.zeros((0, 0), np.bool_)
         self.still: Mask = self.before
-        self.known: Mask = self.before
+        self.vacant: Mask = self.before
         self._farther: DepthArray = self.depth
         self._front: DepthArray = self.depth
         self._stood, self._stood_at = self.depth, self.depth
@@ -187,7 +187,7 @@ class Room:
         self.depth = np.where(somebody, np.float32(0), depth)
         self.before = somebody & (depth > 0)
         self.still = np.zeros(depth.shape, np.bool_)
-        self.known = self.depth > 0
+        self.vacant = ~self.before
         self._farther = np.zeros_like(depth)
         self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
@@ -201,6 +201,7 @@ class Room:
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
         self.before |= somebody & (depth > 0)
+        self.vacant &= ~somebody
 
     def close(self, part: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, into the room: they turned out to be part of it."""
@@ -258,6 +259,7 @@ class Room:
         self._still_for = np.zeros_like(self.depth)
         self._stood = np.zeros_like(self.depth)
         self._has_moved = True
+        self.vacant = ~unknown
         lost: Mask = unknown & ~opened
         return lost
 
@@ -361,7 +363,8 @@ class Room:
         open_ = np.flatnonzero(new & (self._blind >= BLIND_FRAMES))
         if len(open_):
             np.put(before, open_, self._taken(open_, depth, dt, allowed, both, before, surfaces))
-        self.before, self.still, self.known = before, same, known
+        self.before, self.still = before, same
+        self.vacant |= known
         new &= ~before
         if undecided is not None:
             new &= ~undecided
@@ -379,6 +382,7 @@ class Room:
             gone = self._blind >= GONE_FRAMES
             np.copyto(self.depth, 0, where=gone)
             np.copyto(self._front, 0, where=gone)
+            self.vacant |= gone
         self._unlearned += dt
         if farther is None:
             return

@@ -51,7 +51,7 @@ class Scene:
         standing: ``(h, w)`` bool, pixels with a reading that are not floor.
         before: ``(h, w)`` bool, pixels that show something before the room.
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
-        known: ``(h, w)`` bool, where the frames before tell of the room.
+        vacant: ``(h, w)`` bool, where the frames before have shown what is there when nobody is.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
@@ -74,7 +74,7 @@ class Scene:
     standing: npt.NDArray[np.bool_]
     before: npt.NDArray[np.bool_]
     still: npt.NDArray[np.bool_]
-    known: npt.NDArray[np.bool_]
+    vacant: npt.NDArray[np.bool_]
     surfaces: Surfaces
     rim: Rim
     image: npt.NDArray[np.uint8]
@@ -218,7 +218,7 @@ class SceneReader:
             mask,
             before,
             self.room.still,
-            self.room.known,
+            self.room.vacant,
             surfaces,
             self._rim,
             image,
