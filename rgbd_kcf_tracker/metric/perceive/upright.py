@@ -23,8 +23,9 @@ from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 
 HEIGHT = (0.6, 2.1)
 """Metres from the head down to what shows: half of a small person to all of a tall one."""
-TOP = (0.9, 2.15)
-"""Metres of the head's top above the floor."""
+TOP = (1.0, 2.15)
+"""Metres of the head's top above the floor: from a child of four, or somebody who sits and stoops,
+to a tall one. The backs of chairs reach up to 0.9 m, and their seats look like shoulders."""
 WIDTH = (0.25, 1.0)
 """Metres of one person's width: a chest seen from its side, with an arm before it, to arms half
 spread. Everyone at 1 Hz is a little worse from 0.18 m on (docs/metric.md)."""
