@@ -148,6 +148,23 @@ def test_one_that_comes_again_before_the_callback_has_ended_is_not_lost(
     test_one_in_a_callback_of_the_interpreter_comes_again(capsys)
 
 
+def test_what_was_to_come_again_does_not_come_once_all_has_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It ended the next command of the same process."""
+    timers: list[threading.Timer] = []
+    monkeypatch.setattr(threading.Timer, 'start', lambda timer: timers.append(timer))
+    with interrupts.handled():
+        thing: set[int] = set()
+        kept = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing
+        assert kept() is None
+    assert len(timers) == 1
+    with interrupts.handled():
+        timers[0].function()
+        time.sleep(0.01)
+
+
 def test_a_signal_that_is_ignored_stays_so() -> None:
     """As for programs that a shell starts in the background."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -32,6 +32,7 @@ class Interrupts:
         self._held = False
         self._notice = ''
         self._later = 0
+        self._coming: threading.Timer | None = None
 
     @contextmanager
     def handled(self) -> Iterator[None]:
@@ -57,7 +58,7 @@ class Interrupts:
         try:
             yield
         finally:
-            self._later = 0
+            self._later, self._coming = 0, None
             if ours:
                 signal.signal(signal.SIGINT, before)
                 sys.unraisablehook = tell
@@ -92,13 +93,18 @@ class Interrupts:
             print(self._notice, file=sys.stderr, flush=True)
 
     def _come_again(self) -> None:
-        def again() -> None:
-            if self._later > 0 and main is not None:  # else all has ended meanwhile
-                signal.pthread_kill(main, signal.SIGINT)  # also out of what it waits for
-
+        if self._coming is not None or self._later <= 0:
+            return  # one is on its way
         self._later -= 1
         main = threading.main_thread().ident
-        threading.Timer(_LATER_S, again).start()
+
+        def again() -> None:
+            if self._coming is timer and main is not None:  # else all has ended meanwhile
+                self._coming = None
+                signal.pthread_kill(main, signal.SIGINT)  # also out of what it waits for
+
+        timer = self._coming = threading.Timer(_LATER_S, again)
+        timer.start()
 
 
 def _is_lost(frame: FrameType | None) -> bool:
