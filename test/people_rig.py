@@ -93,8 +93,14 @@ def images(people: list[Someone], board: Box | None = None) -> tuple[np.ndarray,
 
 
 def picture(
-    people: list[Someone], seconds: float, board: Box | None = None, pose: Pose | None = None
+    people: list[Someone],
+    seconds: float,
+    board: Box | None = None,
+    pose: Pose | None = None,
+    unread: Someone | None = None,
 ) -> Frame:
-    """A frame of people at a time."""
+    """A frame of people at a time; depth shows nothing of ``unread``."""
     color, depth = images(people, board)
+    if unread is not None:
+        depth[depth == unread.z] = np.nan
     return Frame(color, depth, round(seconds * 1e9), CAMERA, pose)

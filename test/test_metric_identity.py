@@ -1748,10 +1748,8 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
     for i in range(8):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
         one = Someone(-0.5 + 0.1 * pace * i, 3.0, **paint)
-        color, depth = images([one])
-        if i < 4:
-            depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        unread = one if i < 4 else None
+        frame = picture([one], 0.1 * i, unread=unread)
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
         assert i == 0 or i > 3 or track.box is None
     assert (track.box is not None) == (own and pace < 2)
@@ -1768,10 +1766,8 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
     tracker = create_tracker('metric')
     for i in range(2):
         one = Someone(-0.7 + 0.6 * i, 3.0)
-        color, depth = images([one])
-        if i == 0:
-            depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        unread = one if i == 0 else None
+        frame = picture([one], 1.0 * i, unread=unread)
         if i == 0:
             chosen = one.box
             tracker.start(frame, chosen)
@@ -1842,9 +1838,7 @@ def test_of_whom_depth_reads_no_more_the_room_beside_him_is_not_how_he_looks(
     by_look = ByLook(frame, one.box, MetricParameters())
     # The box of a look is as broad as his longest stride.
     stride = Box(one.box.cx - 2 * one.box.width, one.box.y, 4 * one.box.width, one.box.height)
-    color, depth = images([one])
-    depth[depth == one.z] = np.nan
-    unread = reader.read(Frame(color, depth, round(4e8), CAMERA), 0.1)
+    unread = reader.read(picture([one], 0.4, unread=one), 0.1)
     assert unread is not None
     seen = view_in(unread, stride, by_look, one.z)
     assert seen is not None
@@ -1862,9 +1856,7 @@ def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
     tracker = create_tracker('metric')
     for i in range(14):
         one, passer = Someone(0.0, 3.0), Someone(1.4 - 0.1 * i, 2.0)  # in the same
-        color, depth = images([one, passer])
-        depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        frame = picture([one, passer], 0.1 * i, unread=one)
         if i == 0:
             tracker.start(frame, one.box)
             continue
@@ -1884,9 +1876,7 @@ def test_who_passes_before_who_has_no_reading_and_looks_unlike_him_is_not_he(
     for i in range(6):
         one, passer = Someone(0.0, 3.0), Someone(0.1 * i - 0.3, 2.0, GREEN, BLUE)
         passes = i > 3
-        color, depth = images([one, passer] if passes else [one])
-        depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        frame = picture([one, passer] if passes else [one], 0.1 * i, unread=one)
         found = Look(passer.box, 0.9, 0.9, 2.0) if passes else Look(one.box, 0.9, 0.9, None)
         monkeypatch.setattr(ByLook, 'step', lambda *args, found=found: found)
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
@@ -1904,10 +1894,8 @@ def test_who_comes_where_somebody_was_drawn_looks_as_he_did(
     for i in range(8):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
         one = Someone(-0.1 + 0.02 * i, 3.0, **paint)
-        color, depth = images([one] if i == 0 or i > 4 else [])
-        if i == 0:
-            depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        unread = one if i == 0 else None
+        frame = picture([one] if i == 0 or i > 4 else [], 0.1 * i, unread=unread)
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
     assert (track.box is not None) == own
 
@@ -1938,9 +1926,7 @@ def test_of_two_who_come_where_the_target_was_it_is_the_one_in_its_colours(
     monkeypatch.setattr(ByLook, 'step', lambda *args: None)
     tracker = create_tracker('metric')
     target, other = Someone(0.0, 4.4), Someone(-0.1, 3.2, (60, 60, 170), BLACK)
-    color, depth = images([target])
-    depth[depth == target.z] = np.nan
-    tracker.start(Frame(color, depth, 0, CAMERA), target.box)
+    tracker.start(picture([target], 0.0, unread=target), target.box)
     target = Someone(0.45, 4.2)
     track = tracker.update(Frame(*images([target, other]), round(1e9), CAMERA))
     assert track.box is not None
@@ -1974,10 +1960,8 @@ def test_who_comes_between_two_frames_came_in_time_if_the_first_was_in_time(
     tracker = create_tracker('metric')
     for i in range(silent + 1):
         one = Someone(-0.5 + 0.1 * i, 3.0)
-        color, depth = images([one])
-        if i < silent:
-            depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        unread = one if i < silent else None
+        frame = picture([one], 1.0 * i, unread=unread)
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
     assert (track.box is not None) == found
 
@@ -1993,10 +1977,10 @@ def test_who_has_the_number_but_not_the_look_of_one_who_stood_beside_may_be_the_
     beside = Someone(0.15, 3.1, GREEN, BLUE)
     for i in range(2):
         one = Someone(-0.5 + 0.55 * i, 3.0)
-        color, depth = images([one, beside] if i == 0 else [one] if own else [beside])
-        if i == 0:
-            depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(0.5e9 * i), CAMERA)
+        unread = one if i == 0 else None
+        frame = picture(
+            [one, beside] if i == 0 else [one] if own else [beside], 0.5 * i, unread=unread
+        )
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
     assert (track.box is not None) == own
     if track.box is not None:
@@ -2051,9 +2035,7 @@ def test_a_look_does_not_go_over_to_who_stood_beside_in_the_first_frame(
     monkeypatch.setattr(ByLook, 'step', lambda *args: Look(other.box, 1.0, 1.0, other.z))
     tracker = create_tracker('metric')
     for i in range(6):
-        color, depth = images([one, other])
-        depth[depth == one.z] = np.nan
-        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        frame = picture([one, other], 0.1 * i, unread=one)
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
         assert i == 0 or track.box is None
 

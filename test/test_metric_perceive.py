@@ -694,6 +694,7 @@ def test_head_and_shoulders_are_a_person_and_a_box_is_not():
     assert upright(silhouette(depth), CAMERA, None)
     assert upright(silhouette(depth), CAMERA, 1.1), 'as of somebody who sits and stoops'
     assert not upright(silhouette(depth), CAMERA, 0.92), 'the back of a chair above its seat'
+    assert not upright(silhouette(depth), CAMERA, 0.5), 'no person ends at half a metre'
     box = wall()
     seen = Someone(0.0, 3.0).box
     box[int(seen.y) : int(seen.bottom), int(seen.x) : int(seen.right)] = 3.0
