@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +35,20 @@ def is_reading(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
     return good
 
 
+def _plain(image: npt.NDArray[Any], name: str, nothing: np.generic) -> npt.NDArray[Any]:
+    """An image as an array that is of no other kind, with ``nothing`` where it is masked."""
+    if type(image) is np.ndarray:
+        return image
+    if isinstance(image, np.ma.MaskedArray):
+        filled: npt.NDArray[Any] = image.filled(nothing) if image.dtype == nothing.dtype else image
+        return np.asarray(filled)
+    if isinstance(image, np.ndarray):
+        return np.asarray(image)
+    if not hasattr(image, 'ndim'):
+        raise ImageError(f'{name} image is a {type(image).__name__}: give an array')
+    return image  # one that is only read where it is looked at
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """Colour, registered depth, stamp and camera of one moment.
@@ -42,13 +58,15 @@ class Frame:
         depth: ``(H, W)`` float32 metres along the optical axis, registered to ``color``, NaN where
             there is no reading; None where the camera gave no depth for this moment. What
             :func:`is_reading` refuses counts as no reading.
-        stamp_ns: time of exposure in nanoseconds.
+        stamp_ns: time of exposure in whole nanoseconds.
         intrinsics: of the colour image, or None where unknown.
         pose: of the camera's optical frame in a fixed frame, or None where unknown.
         camera: its name, where there are several.
 
     Raises:
         ImageError: where a shape or type is not as above.
+
+    What is masked, as :mod:`numpy.ma` does, counts as no reading.
     """
 
     color: npt.NDArray[np.uint8]
@@ -59,15 +77,21 @@ class Frame:
     camera: str = ''
 
     def __post_init__(self) -> None:
-        color = self.color
+        color = _plain(self.color, 'colour', np.uint8(0))
+        object.__setattr__(self, 'color', color)
+        try:
+            object.__setattr__(self, 'stamp_ns', operator.index(self.stamp_ns))
+        except TypeError:
+            raise ImageError(f'stamp_ns is {self.stamp_ns!r}: give whole nanoseconds') from None
         if color.ndim != 3 or color.shape[2] != 3 or color.dtype != np.uint8 or color.size == 0:
             raise ImageError(
                 f'colour image is {color.shape} {color.dtype}: '
                 'expected (height, width, 3) uint8 BGR'
             )
-        depth = self.depth
-        if depth is None:
+        if self.depth is None:
             return
+        depth = _plain(self.depth, 'depth', np.float32(np.nan))
+        object.__setattr__(self, 'depth', depth)
         if depth.dtype != np.float32 or depth.ndim != 2:
             raise ImageError(
                 f'depth image is {depth.shape} {depth.dtype}: '

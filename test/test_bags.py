@@ -30,7 +30,9 @@ from bag_rig import (
     STEP_NS,
     Sent,
     assert_same_frames,
+    camera_info,
     camera_messages,
+    header,
     image,
     make_frames,
     write_mcap,
@@ -348,7 +350,39 @@ def test_messages_out_of_order_are_put_right(tmp_path: Path) -> None:
     shuffled = [dataclasses.replace(sent[i], log_ns=START_NS + n) for n, i in enumerate(order)]
     frames, warnings = read(write_mcap(tmp_path / 'a.mcap', shuffled))
     assert_same_frames(frames, FRAMES)
-    assert warnings == []
+    assert warnings == [
+        '/camera/depth/image_raw: 1 images were recorded after later ones: put in order'
+    ]
+
+
+def test_each_frame_has_the_camera_that_was_told_last(tmp_path: Path) -> None:
+    """As live: the first alone was read, zeros that a driver sends at first for good."""
+    frames = [dataclasses.replace(f, intrinsics=None) for f in FRAMES]
+    sent = camera_messages(frames, info=None)
+
+    def told(at: int, fx: float) -> Sent:
+        stamp = frames[at].stamp_ns
+        camera = dataclasses.replace(CAMERA, fx=fx) if fx else CAMERA
+        message = camera_info(header(stamp, 'optical'), *SIZE, camera)
+        if not fx:
+            message.k, message.p = np.zeros(9), np.zeros(12)
+        return Sent(INFO, stamp + 1_000_000, message)
+
+    zeros, one, other = (told(0, 0.0), told(1, 0.0)), told(2, 30.0), told(4, 40.0)
+    path = write_mcap(tmp_path / 'a.mcap', sorted([*sent, *zeros, one, other], key=_logged))
+    with open_recording(path) as recording:
+        assert recording.intrinsics is not None
+        seen = [f.intrinsics.fx for f in recording.frames() if f.intrinsics is not None]
+        again = [f.intrinsics.fx for f in recording.frames(3, 5) if f.intrinsics is not None]
+        late, changes = recording.warnings
+    assert seen == [30.0] * 4 + [40.0] * (len(frames) - 4)
+    assert again == [30.0, 40.0]
+    assert late == f'{INFO} holds zeros: the camera is not calibrated: that of message 2 is taken'
+    assert changes.startswith(f'{INFO}: the camera changes, at frame 4 from fx=30')
+
+
+def _logged(message: Sent) -> int:
+    return message.log_ns
 
 
 def test_messages_twice_are_read_once(tmp_path: Path) -> None:

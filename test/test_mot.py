@@ -53,6 +53,7 @@ def test_ground_truth_of_mot16_and_later_has_class_and_visible_share(tmp_path: P
         ('1,2.5,3,4,5,6,1,-1,-1,-1', 'line 2: id 2.5'),
         ('1,-1,3,4,5,6,1,-1,-1,-1', 'line 2: id -1: these are detections'),
         ('1,2,3,4,0,6,1,-1,-1,-1', 'line 2: a box of 0 x 6 pixels'),
+        ('1,2,3,1e300,5,6,1,-1,-1,-1', 'line 2: .* the box is beyond 9007'),
         ('1,1,3,4,5,6,1,-1,-1,-1', 'line 2: id 1 is in frame 1 already, by line 1'),
         ('8,1,3,4,5,6,1,-1,-1,-1', 'line 2: frame 8, but the recording has 7 frames'),
         ('', 'line 2: .* is no sighting'),

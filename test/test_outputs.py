@@ -474,3 +474,78 @@ def test_a_folder_with_other_things_is_never_replaced(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match='is a file'):
         OutputFolder(tmp_path / 'a' / 'thesis.txt', ())
     assert digest(tmp_path) == before
+
+
+def test_what_is_put_into_a_folder_while_its_successor_is_made_is_not_lost(tmp_path: Path) -> None:
+    path = tmp_path / 'a'
+    write_one(path)
+    old = digest(path)
+    folder = SequenceWriter(path, overwrite=True)
+    folder.write(Frame(np.full((48, 64, 3), 90, np.uint8), None, 0))
+    (path / 'notes.txt').write_text('precious')
+    with pytest.raises(RecordingError, match=r'holds notes\.txt'):
+        folder.close()
+    assert (path / 'notes.txt').read_text() == 'precious'
+    assert digest(path).items() >= old.items()
+    assert len(open_recording(tmp_path / 'a.part')) == 1
+
+
+def test_a_file_that_is_removed_while_it_is_written_is_told(tmp_path: Path) -> None:
+    path = tmp_path / 'a.csv'
+    table = TrackCsvWriter(path)
+    table.write_track(0, 0, SEEN)
+    path.unlink()
+    with pytest.raises(RecordingError, match='was removed while it was written'):
+        table.close()
+
+
+def test_the_name_of_a_folder_is_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(RecordingError, match='is the name of a folder'):
+        OutputFile(f'{tmp_path}/a.csv/')
+    source = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))
+    new = f'{tmp_path}/new/'
+    assert main(['track', str(source), *INIT, '--output', new]) == 2
+    assert f'{new} is the name of a folder' in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ['a.mcap']
+
+
+def test_names_are_shown_without_their_control_characters(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / 'a\x1b[31m.mcap'
+    write_mcap(source, camera_messages(FRAMES))
+    new = f'{tmp_path}/b\x1b[32m\n.csv'
+    assert main(['track', str(source), *INIT, '--variant', 'kcf', '--output', new]) == 0
+    assert main(['convert', str(source), f'{tmp_path}/c\x07.mcap']) == 0
+    said = capsys.readouterr().out
+    assert '\\x1b[31m' in said
+    assert '\\x1b[32m\\n.csv' in said
+    assert 'c\\x07.mcap' in said
+    assert not {'\x1b', '\x07'} & set(said)
+
+
+@pytest.mark.parametrize('stamp', [-1, 1 << 62])
+def test_a_stamp_that_cannot_be_read_again_is_not_written(tmp_path: Path, stamp: int) -> None:
+    frame = Frame(np.full((48, 64, 3), 90, np.uint8), None, stamp)
+    with SequenceWriter(tmp_path / 'a') as folder:
+        with pytest.raises(RecordingError, match=f'the stamp {stamp} ns'):
+            folder.write(frame)
+        folder.write(Frame(frame.color, None, 5))
+    with pytest.raises(RecordingError, match='is closed'):
+        folder.write(Frame(frame.color, None, 6))
+    if stamp > 0:
+        with (
+            BagWriter(tmp_path / 'a.mcap') as bag,
+            pytest.raises(RecordingError, match=f'the stamp {stamp} ns'),
+        ):
+            bag.write_frame(frame)
+
+
+def test_a_folder_whose_stamps_stand_still_gives_a_bag_with_every_frame(tmp_path: Path) -> None:
+    write_one(tmp_path / 'a')
+    (tmp_path / 'a' / 'timestamps.txt').write_text('5\n5\n4\n')
+    assert main(['convert', str(tmp_path / 'a'), str(tmp_path / 'a.mcap')]) == 0
+    with open_recording(tmp_path / 'a.mcap') as recording:
+        assert [frame.stamp_ns for frame in recording.frames()] == [5, 6, 7]

@@ -324,6 +324,22 @@ def test_lockstep_sends_again_what_was_lost_then_gives_up() -> None:
     assert any('going on without' in w for w in warnings)
 
 
+def test_lockstep_says_that_it_cannot_tell_answers_of_one_stamp_apart() -> None:
+    warnings: list[str] = []
+    answers = Answers(has_depth=False)
+    player = Player(
+        lambda m: answers.answered(m.stamp_ns),
+        Pacer(0.0),
+        answers,
+        lockstep=True,
+        answer_timeout_s=0.05,
+        warn=warnings.append,
+    )
+    images = [m for m in recording(4, step_ms=0) if m.role is Role.COLOR]
+    assert player.play(images, threading.Event())
+    assert [w for w in warnings if 'cannot tell their answers apart' in w] == warnings[:1]
+
+
 def test_stop_ends_a_player_that_waits() -> None:
     stop = threading.Event()
     threading.Timer(0.1, stop.set).start()

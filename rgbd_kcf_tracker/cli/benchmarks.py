@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import add_topic_options, parse_intrinsics
+from rgbd_kcf_tracker.cli.common import add_topic_options, escaped, parse_intrinsics
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
     EXIT_FAILURES,
@@ -228,7 +228,7 @@ def list_failures(failures: Sequence[Failure]) -> None:
     for failure in failures:
         last = failure.reason.strip().splitlines()[-1]
         tracker = f' ({failure.tracker})' if failure.tracker else ''
-        print(f'  {failure.sequence}{tracker}: {last}', file=sys.stderr)
+        print(escaped(f'  {failure.sequence}{tracker}: {last}'), file=sys.stderr)
 
 
 def end(failures: Sequence[Failure]) -> int:

@@ -14,6 +14,7 @@ from rgbd_kcf_tracker.cli.common import (
     Warnings,
     add_overwrite_option,
     add_reading_options,
+    escaped,
     progress,
     read_options,
     refuse_reading,
@@ -84,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
                 overwrite=args.overwrite,
             )
             warnings.show()
-        print(f'{dest}: {count} frames')
+        print(escaped(f'{dest}: {count} frames'))
         return 0
     refuse_reading(args, 'for a bag, of which every message is copied: leave it out')
     bag = RawBag(source)
@@ -104,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
         if not count:
             raise RecordingError(f'{source} holds no message that can be read: nothing is written')
         topics = sum(1 for topic in bag.topics.values() if len(topic))
-        print(f'{dest}: {count} messages of {topics} topics')
+        print(escaped(f'{dest}: {count} messages of {topics} topics'))
     finally:
         bag.close()
     return 0

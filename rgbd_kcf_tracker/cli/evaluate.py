@@ -23,7 +23,13 @@ from rgbd_kcf_tracker.cli.benchmarks import (
     run_options,
     words,
 )
-from rgbd_kcf_tracker.cli.common import add_overwrite_option, parse_assignments, progress, refuse
+from rgbd_kcf_tracker.cli.common import (
+    add_overwrite_option,
+    escaped,
+    parse_assignments,
+    progress,
+    refuse,
+)
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.workers import WORKER_OPTIONS, add_worker_options, record, shard_of
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
@@ -202,7 +208,7 @@ def _report_one(folder: Path, whole: Whole) -> int:
         if places is not None:
             print(f'\n{places.text()}')
         times = _write_times(folder, [(r.tracker, r.sequence) for r in collected.results])
-        print(f'\n{times}\n\nreport: {folder / PAGE}')
+        print(f'\n{times}\n\nreport: {escaped(str(folder / PAGE))}')
     return end(whole.failures)
 
 
@@ -234,7 +240,7 @@ def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
     pairs = identity.all_pairs(seen, identity.metric_views())
     table = write_identity_report(args.report, pairs, failures, _heading(args))
     print(table.text())
-    print(f'\nreport: {args.report / PAGE}')
+    print(f'\nreport: {escaped(str(args.report / PAGE))}')
     return end(failures)
 
 
@@ -257,7 +263,7 @@ def _report_everyone(folder: Path, whole: Whole) -> int:
         times = _write_times(
             folder, [(r.tracker, everyone.times_name(r.sequence)) for r in results]
         )
-        print(f'\n{times}\n\nreport: {folder / PAGE}')
+        print(f'\n{times}\n\nreport: {escaped(str(folder / PAGE))}')
     return end(whole.failures)
 
 

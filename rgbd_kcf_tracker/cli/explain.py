@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_overwrite_option,
     add_reading_options,
     add_scene_options,
+    escaped,
     open_source,
     parse_box,
 )
@@ -88,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
         title = f'Frame {asked} of {recording.name}, explained'
         written = write_page(folder, title, _command(), chapters, args.overwrite)
     count = sum(path.suffix == '.png' for path in written)
-    print(f'{recording.name}: frame {asked} in {count} pictures; open {folder / PAGE}')
+    print(escaped(f'{recording.name}: frame {asked} in {count} pictures; open {folder / PAGE}'))
     return 0
 
 

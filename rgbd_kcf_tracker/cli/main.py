@@ -85,8 +85,13 @@ def _run(arguments: list[str]) -> int:
     except BrokenPipeError:
         return 1  # the reader of our output is gone (``| head``): nothing is left to say
     except OSError as error:
+        from rgbd_kcf_tracker.cli.common import escaped
+
         name = f'{error.filename}: ' if error.filename else _unnamed(error.errno)
-        print(f'{PROGRAM}: error: {name}{error.strerror or error}', file=sys.stderr)
+        print(f'{PROGRAM}: error: {escaped(name)}{error.strerror or error}', file=sys.stderr)
+        return EXIT_USAGE
+    except MemoryError:
+        print(f'{PROGRAM}: error: there is not enough memory', file=sys.stderr)
         return EXIT_USAGE
 
 

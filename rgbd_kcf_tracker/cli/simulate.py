@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rgbd_kcf_tracker.cli.common import add_overwrite_option, progress
+from rgbd_kcf_tracker.cli.common import add_overwrite_option, escaped, progress
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def _draw_sheet(
     if not done:
         raise RecordingError(f'{path} cannot be encoded: fewer scenes make a smaller picture')
     write_file(path, data.tobytes(), args.overwrite)
-    print(f'{path}: {len(jobs)} scenes')
+    print(escaped(f'{path}: {len(jobs)} scenes'))
 
 
 def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list[Path]:
@@ -215,8 +215,8 @@ def _record(
             hidden += simulated.visible is None
     people = f'{len(sequence.people)} people, ' if len(sequence.people) > 1 else ''
     print(
-        f'{dest}: {title}: {len(sequence)} frames at {sequence.rate_hz:g} Hz, {people}'
-        f'the target hidden in {hidden}',
+        f'{escaped(str(dest))}: {title}: {len(sequence)} frames at {sequence.rate_hz:g} Hz, '
+        f'{people}the target hidden in {hidden}',
         flush=True,
     )
 

@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.cli.benchmarks import (
     run_jobs,
     run_options,
 )
-from rgbd_kcf_tracker.cli.common import add_overwrite_option
+from rgbd_kcf_tracker.cli.common import add_overwrite_option, escaped
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.workers import add_worker_options, shard_of
 from rgbd_kcf_tracker.errors import ParameterError
@@ -158,7 +158,7 @@ def run(args: argparse.Namespace) -> int:
         tables = write_sweep_report(args.report, found, failures, heading, frames)
         for table in tables[:2]:
             print(f'{table.text()}\n')
-        print(f'report: {args.report / PAGE}')
+        print(f'report: {escaped(str(args.report / PAGE))}')
         return end(failures)
 
 

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_overwrite_option,
     add_reading_options,
     add_tracker_options,
+    escaped,
     parse_box,
     progress,
     read_options,
@@ -88,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     if track_many.is_asked(args):
         return track_many.run(args)
     (args.source,) = args.source
-    print(follow(args), file=sys.stderr if args.output == '-' else sys.stdout)
+    print(escaped(str(follow(args))), file=sys.stderr if args.output == '-' else sys.stdout)
     return 0
 
 

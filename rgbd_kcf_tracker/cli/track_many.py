@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rgbd_kcf_tracker.cli.common import escaped
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
     EXIT_FAILURES,
@@ -166,8 +167,8 @@ def _run_in(
     else:
         _write_tables(folders['output'], own, rows, args.table or TABLES[0])
     for name, row in rows.items():
-        print(f'{name}: {row["error"]}', file=sys.stderr)
-    print(f'{len(own) - len(rows)} of {len(own)} recordings are in {folders["output"]}')
+        print(escaped(f'{name}: {row["error"]}'), file=sys.stderr)
+    print(escaped(f'{len(own) - len(rows)} of {len(own)} recordings are in {folders["output"]}'))
     return EXIT_FAILURES if rows else 0
 
 

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.cli.common import (
     add_scene_options,
     add_tracker_options,
     counter,
+    escaped,
     open_source,
     parse_box,
     refuse,
@@ -180,6 +181,9 @@ def _export(
         )  # fmt: skip
     size = path.stat().st_size / 1e6
     print(
-        f'{recording.name}: {count} moments of frames {start} to {end - 1} in {path}, {size:.1f} MB'
+        escaped(
+            f'{recording.name}: {count} moments of frames {start} to {end - 1} in {path}, '
+            f'{size:.1f} MB'
+        )
     )
     return 0

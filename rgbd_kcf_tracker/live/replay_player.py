@@ -72,6 +72,8 @@ class Player:
         self._tick = tick
         self._warn = warn
         self._recent: deque[Message] = deque(maxlen=RECENT)
+        self._last_stamp_ns: int | None = None
+        self._same_told = False
         self.progress = Progress()
 
     def play(self, messages: Iterable[Message], stop: Stopping) -> bool:
@@ -96,6 +98,13 @@ class Player:
     def _announce(self, message: Message) -> None:
         if message.role is Role.COLOR:
             self.progress.colors += 1
+            if self._lockstep and message.stamp_ns == self._last_stamp_ns and not self._same_told:
+                self._same_told = True
+                self._warn(
+                    f'images have one stamp, {message.stamp_ns * 1e-9:.3f} s: lock-step cannot '
+                    'tell their answers apart, and some may be passed over (lockstep:=false)'
+                )
+            self._last_stamp_ns = message.stamp_ns
             self._answers.sent_color(message.stamp_ns)
         elif message.role is Role.DEPTH:
             self.progress.depths += 1

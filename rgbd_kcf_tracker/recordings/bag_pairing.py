@@ -9,6 +9,7 @@ from array import array
 
 from rgbd_kcf_tracker.recordings.pairing import (
     DEFAULT_TOLERANCE_S,
+    JUMP_BACK_S,
     Pair,
     PairingCounts,
     StampPairer,
@@ -20,7 +21,7 @@ FramePair = Pair[int, int]
 """Numbers of a colour and a depth message within their topics."""
 
 _WIDEST_S = 0.5
-_JUMP_NS = 1_000_000_000
+_JUMP_NS = round(JUMP_BACK_S * 1e9)
 
 
 def pair_topics(
@@ -57,6 +58,12 @@ def pair_topics(
             warnings.append(
                 f'no depth image is within {tolerance * 1e3:g} ms of a colour image: paired '
                 f'up to {max(distances) / 1e6:.0f} ms apart (set the limit with --tolerance)'
+            )
+    for topic, stamps in ((color, color_stamps), (depth, depth_stamps)):
+        swapped = _overtaken(stamps)
+        if topic is not None and swapped:
+            warnings.append(
+                f'{topic.name}: {swapped} images were recorded after later ones: put in order'
             )
     return pairs, warnings + _oddities(color, depth, pairs, counts)
 
@@ -130,6 +137,18 @@ def _in_time_order(
     else:
         events.sort(key=lambda e: (e[4], e[2]))
     return [(is_color, stamp, index) for _, stamp, is_color, index, _ in events]
+
+
+def _overtaken(stamps: array[int]) -> int:
+    """How many come after one that is later, where time does not jump back."""
+    back = 0
+    newest: int | None = None
+    for stamp in stamps:
+        if newest is not None and newest - _JUMP_NS <= stamp < newest:
+            back += 1
+        else:
+            newest = stamp
+    return back
 
 
 def _segments(stamps: array[int]) -> list[int]:

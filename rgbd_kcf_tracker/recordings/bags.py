@@ -11,6 +11,7 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.bag_cameras import BagCameras
 from rgbd_kcf_tracker.recordings.bag_pairing import pair_topics
 from rgbd_kcf_tracker.recordings.bag_topics import (
     COMPRESSED,
@@ -21,7 +22,6 @@ from rgbd_kcf_tracker.recordings.bag_topics import (
     look_at_images,
     rate_of,
 )
-from rgbd_kcf_tracker.recordings.camera_info import camera_from_info
 from rgbd_kcf_tracker.recordings.images import (
     ColorImage,
     DepthImage,
@@ -53,6 +53,7 @@ class BagRecording(Closing):
         self._max_pixels = options.max_pixels
         self.bag = RawBag(path)
         self.warnings: list[str] = list(self.bag.warnings)
+        self._warned: set[str] = set()
         try:
             self._images = look_at_images(self.bag)
             self.topics = self._choose(options)
@@ -62,13 +63,13 @@ class BagRecording(Closing):
             self._depth = None if self.topics.depth is None else self.bag.topics[self.topics.depth]
             self._pairs, told = pair_topics(self._color, self._depth, options.tolerance_s)
             self.warnings += told
-            self.intrinsics = options.intrinsics or self._read_intrinsics(options.rectified)
+            self._cameras = None if options.intrinsics else self._open_cameras(options.rectified)
+            self.intrinsics = options.intrinsics or self._first_intrinsics()
             self.groundtruth = self._read_truth(TRUTH_TOPICS[0])
             self.groundtruth_body = known(self._read_truth(TRUTH_TOPICS[1]))
         except BaseException:
             self.bag.close()
             raise
-        self._warned: set[str] = set()
 
     def __len__(self) -> int:
         return len(self._pairs)
@@ -94,8 +95,12 @@ class BagRecording(Closing):
                 )
             size = color.shape[0], color.shape[1]
             depth = None if pair.depth is None else self._read_depth(pair.depth, number, odd)
+            camera = self.intrinsics
+            if self._cameras is not None:
+                logged = self._color.log_ns[pair.color]
+                camera = self._cameras.of(logged, (size[1], size[0]), number)
             try:
-                yield Frame(color, depth, pair.stamp_ns, self.intrinsics)
+                yield Frame(color, depth, pair.stamp_ns, camera)
             except ImageError as error:
                 raise ImageError(
                     f'{self.path}, frame {number} ({self.topics.color} with {self.topics.depth}): '
@@ -178,25 +183,23 @@ class BagRecording(Closing):
             self._warned.add(text)
             self.warnings.append(text)
 
-    def _read_intrinsics(self, rectified: str) -> Intrinsics | None:
+    def _open_cameras(self, rectified: str) -> BagCameras | None:
         if self.topics.info is None:
             return None
-        topic = self.bag.topics[self.topics.info]
+        topic, pictures = self.bag.topics[self.topics.info], base_name(self.topics.color)
+        return BagCameras(self.bag, topic, pictures, rectified, self._warn)
+
+    def _first_intrinsics(self) -> Intrinsics | None:
+        """Of the first frames, unless they are of another size."""
+        first = None if self._cameras is None else self._cameras.first
+        if first is None:
+            return None
         size = next(i.size for i in self._images if i.name == self.topics.color)
-        try:
-            msg = self.bag.message(topic, 0)
-            found = camera_from_info(msg, base_name(self.topics.color), rectified)
-        except RgbdKcfError as error:
-            self.warnings.append(f'{topic.name}: {error}')
-            return None
-        if found is None:
-            self.warnings.append(f'{topic.name} holds zeros: the camera is not calibrated')
-            return None
-        misfit = '' if size is None else found.misfit(*size)
+        misfit = '' if size is None else first.misfit(*size)
         if misfit:
-            self.warnings.append(f'{topic.name} {misfit}: left out')
+            self._warn(f'{self.topics.info} {misfit}: left out')
             return None
-        return found.intrinsics
+        return first.intrinsics
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         topic = self.bag.topics.get(name)

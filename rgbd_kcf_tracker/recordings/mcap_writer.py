@@ -96,6 +96,8 @@ class McapWriter(FrameWriter):
             RecordingError: where it cannot be written.
         """
         log_ns = max(log_ns, 0)
+        if self._file.closed:
+            raise RecordingError(f'{self.path} is closed: nothing more can be written to it')
         try:
             channel = self._channels.get(topic)
             if channel is None:

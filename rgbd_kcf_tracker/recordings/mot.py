@@ -169,6 +169,8 @@ def _parse(place: str, line: str) -> tuple[float, ...]:
         raise RecordingError(f'{place}: id {cells[1]}: write whole numbers from 0 to {LARGEST}')
     if width <= 0 or height <= 0:
         raise RecordingError(f'{place}: a box of {width:g} x {height:g} pixels has no size')
+    if max(abs(x), abs(y), width, height) > LARGEST:
+        raise RecordingError(f'{place}: {shown}: the box is beyond {LARGEST} pixels')
     share = math.nan
     position = [math.nan] * 3
     if len(values) == 9:

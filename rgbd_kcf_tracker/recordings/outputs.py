@@ -71,6 +71,8 @@ def check_outputs(
         refuse_standard_output(option, given)
         target = _target(Path(given))
         _check_place(Path(given), target)
+        if option not in folders:
+            _refuse_slash(given)
         places[option] = Path(given), target, _stat(target)
     parts = list(dict.fromkeys(part for source in sources for part in _parts(source)))
     read = _read_among([there for *_, there in places.values() if there is not None], parts)
@@ -177,6 +179,7 @@ class OutputFile:
         self.path = Path(path)
         self._target = _target(self.path)
         _check_place(self.path, self._target)
+        _refuse_slash(path)
         there = _stat(self._target)
         mode = 0o666
         try:
@@ -222,9 +225,12 @@ class OutputFile:
         replaces = self.place != self._target
         try:
             try:
-                if anything and whole and replaces and not self.file.closed:
+                if anything and not self.file.closed:
                     self.file.flush()
-                    os.fsync(self.file.fileno())  # or a power cut leaves neither old nor new
+                    if whole and replaces:
+                        os.fsync(self.file.fileno())  # or a power cut leaves neither old nor new
+                    if not os.fstat(self.file.fileno()).st_nlink:
+                        raise RecordingError(f'{self.path} was removed while it was written')
             finally:
                 with contextlib.suppress(OSError):  # a full disk was told when it was written
                     self.file.close()
@@ -275,6 +281,7 @@ class OutputFolder:
     ) -> None:
         self.path = Path(path)
         self._target = _target(self.path)
+        self._known = known
         _check_place(self.path, self._target)
         there = _stat(self._target)
         self._made = there is None
@@ -290,12 +297,7 @@ class OutputFolder:
                 return
             if not overwrite:
                 raise RecordingError(_is_there(self.path))
-            others = [name for name in held if not any(fnmatchcase(name, k) for k in known)]
-            if others:
-                raise RecordingError(
-                    f'{self.path} holds {", ".join(others[:3])}, which we did not write: '
-                    'it is not replaced'
-                )
+            self._refuse_others(self._target)
             self.place, _ = _first_free(self._target, os.mkdir)
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
@@ -312,12 +314,29 @@ class OutputFolder:
             elif whole and replaces:
                 old, _ = _first_free(self._target, os.mkdir)
                 self._target.rename(old)
+                try:
+                    self._refuse_others(old)  # what somebody put there meanwhile
+                except RecordingError:
+                    old.rename(self._target)
+                    _tell_kept(self.path, self.place)
+                    raise
                 self.place.rename(self._target)
                 shutil.rmtree(old)
             elif replaces:
                 _tell_kept(self.path, self.place)
         except OSError as error:
             raise RecordingError(cannot_write(self.path, error)) from None
+
+    def _refuse_others(self, folder: Path) -> None:
+        """Refuse a folder in which something is that we did not write."""
+        known = self._known
+        held = sorted(os.listdir(folder))
+        others = [name for name in held if not any(fnmatchcase(name, k) for k in known)]
+        if others:
+            raise RecordingError(
+                f'{self.path} holds {", ".join(others[:3])}, which we did not write: '
+                'it is not replaced'
+            )
 
 
 def _tell_kept(path: Path, place: Path) -> None:
@@ -425,6 +444,12 @@ def _check_place(path: Path, target: Path) -> None:
         ) from None
     except OSError as error:
         raise RecordingError(cannot_write(path, error)) from None
+
+
+def _refuse_slash(given: str | os.PathLike[str]) -> None:
+    """Refuse what by its end is the name of a folder."""
+    if os.fspath(given).endswith(os.sep):
+        raise RecordingError(f'{given} is the name of a folder: give the name of a file')
 
 
 def _check_folder(path: Path, there: os.stat_result) -> None:

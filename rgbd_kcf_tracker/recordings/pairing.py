@@ -16,6 +16,7 @@ waits is given out, and pairing starts afresh.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -24,6 +25,25 @@ D = TypeVar('D')
 
 DEFAULT_TOLERANCE_S = 0.02
 """Well under the 33 ms between frames at 30 Hz, and above the jitter of unsynchronised streams."""
+
+
+JUMP_BACK_S = 1.0
+"""Seconds by which what is older than the newest has not changed places with it, but was taken
+before time jumped back: no stream's messages overtake each other by so much."""
+
+
+def rising(stamps: Iterable[int]) -> tuple[int, ...]:
+    """Stamps in nanoseconds, each at least one after that before, but where time jumps back.
+
+    >>> rising([5, 5, 7, 6, 9])
+    (5, 6, 7, 8, 9)
+    """
+    told: list[int] = []
+    for stamp in stamps:
+        if told and told[-1] - JUMP_BACK_S * 1e9 <= stamp <= told[-1]:
+            stamp = told[-1] + 1
+        told.append(stamp)
+    return tuple(told)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +114,7 @@ class StampPairer(Generic[C, D]):
         capacity: int = 30,
         patience_s: float = 0.0,
         max_wait_s: float = 0.5,
-        jump_back_s: float = 1.0,
+        jump_back_s: float = JUMP_BACK_S,
     ) -> None:
         self.tolerance_ns = round(tolerance_s * 1e9)
         self.capacity = max(capacity, 1)

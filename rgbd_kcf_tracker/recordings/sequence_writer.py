@@ -23,7 +23,12 @@ from rgbd_kcf_tracker.recordings.camera_info import model_of
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.outputs import FrameWriter, OutputFolder, cannot_write, part_of
-from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, format_box
+from rgbd_kcf_tracker.recordings.textfiles import (
+    CAMERA_INFO,
+    INTRINSICS,
+    LAST_STAMP_NS,
+    format_box,
+)
 
 _FILES = (
     'rgb',
@@ -96,6 +101,7 @@ class SequenceWriter(FrameWriter):
         self._suffix = color_format
         self._files: dict[str, FileIO] = {}
         self._count = 0
+        self._closed = False
         self._make('rgb')
 
     def write(
@@ -123,6 +129,13 @@ class SequenceWriter(FrameWriter):
         Raises:
             RecordingError: where it cannot be written.
         """
+        if self._closed:
+            raise RecordingError(f'{self.output.path} is closed: nothing more can be written to it')
+        if not 0 <= frame.stamp_ns < LAST_STAMP_NS:
+            raise RecordingError(
+                f'{self.output.path} cannot hold the stamp {frame.stamp_ns} ns: '
+                f'timestamps.txt takes 0 to {LAST_STAMP_NS - 1}'
+            )
         name = f'{self._count + 1:06d}'
         sizes = {key: file.tell() for key, file in self._files.items()}
         images: dict[str, Path] = {}
@@ -157,6 +170,7 @@ class SequenceWriter(FrameWriter):
         Raises:
             RecordingError: where it cannot be written.
         """
+        self._closed = True
         files, self._files = self._files, {}
         for file in files.values():
             with contextlib.suppress(OSError):  # a full disk was told when it was written

@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.recordings.imagefiles import (
     unnumbered,
 )
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
+from rgbd_kcf_tracker.recordings.pairing import rising
 from rgbd_kcf_tracker.recordings.recording import (
     NO_DEPTH,
     Closing,
@@ -180,8 +181,11 @@ class SequenceFolder(Closing):
             )
         back = sum(b <= a for a, b in pairwise(stamps))
         if back:
-            self.warnings.append(f'{path.name}: {back} stamps do not come after the one before')
-        return stamps
+            self.warnings.append(
+                f'{path.name}: {back} stamps do not come after the one before; unless time jumps '
+                'back by a second there, they are taken to be a nanosecond later'
+            )
+        return rising(stamps)
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         path = self.path / name

@@ -21,8 +21,8 @@ from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
 INTRINSICS, CAMERA_INFO = 'intrinsics.json', 'camera_info.json'
 
-# ROS stamps hold 32 bits of seconds.
-_LAST_STAMP_NS = (1 << 31) * NANOSECONDS
+LAST_STAMP_NS = (1 << 31) * NANOSECONDS
+"""Nanoseconds that no stamp reaches: ROS's hold 32 bits of seconds."""
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -121,13 +121,13 @@ def read_stamps(path: Path) -> list[int]:
     for number, line in enumerate(read_lines(path), start=1):
         try:
             stamp = int(line)
-            if not 0 <= stamp < _LAST_STAMP_NS:
+            if not 0 <= stamp < LAST_STAMP_NS:
                 raise ValueError
             stamps.append(stamp)
         except ValueError:
             raise RecordingError(
-                f'{path}, line {number}: {line.strip()[:60]!r} is no stamp: '
-                'write whole nanoseconds, one per image'
+                f'{path}, line {number}: {line.strip()[:60]!r} is no stamp: write whole '
+                f'nanoseconds, one per image, from 0 to {LAST_STAMP_NS - 1} as ROS has them'
             ) from None
     return stamps
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.camera_info import model_of
@@ -55,8 +56,16 @@ class TrackMessages:
         self.types, self._make = types, types.make
 
     def header(self, stamp_ns: int, frame_id: str) -> Any:
-        """``std_msgs/Header``."""
+        """``std_msgs/Header``.
+
+        Raises:
+            RecordingError: for a stamp beyond the 32 bits of seconds that it has.
+        """
         seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
+        if not -(1 << 31) <= seconds < 1 << 31:
+            raise RecordingError(
+                f'the stamp {stamp_ns} ns is beyond the seconds that a ROS message holds'
+            )
         stamp = self._make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
         return self._make('std_msgs/msg/Header', stamp=stamp, frame_id=frame_id)
 

@@ -121,6 +121,8 @@ def run(
     except RgbdKcfError as error:
         return _failed(parser, error, USER_MISTAKE)
     except Exception as error:  # also rclpy's: a node name, a namespace, a domain that is taken
+        if 'PARAMETER_NOT_SET' in str(error):  # rclpy does not say which
+            return _failed(parser, RgbdKcfError(_empty_list(argv)), USER_MISTAKE)
         return _failed(parser, error, FAILURE)
     finally:
         stop.ignore()
@@ -129,6 +131,12 @@ def run(
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _empty_list(argv: Sequence[str]) -> str:
+    named = [word.removesuffix(':=[]') for word in argv if word.endswith(':=[]')]
+    which = f'parameter {named[0]}' if named else 'a parameter of the params file'
+    return f'{which} is an empty list, which has no type to ROS: leave it out'
 
 
 def _failed(parser: argparse.ArgumentParser, error: Exception, status: int) -> int:

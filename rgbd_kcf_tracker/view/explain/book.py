@@ -46,6 +46,10 @@ def explain(
         ParameterError: where the frame does not lie behind the first.
         BoxError: where the box lies outside the image.
     """
+    if start == len(recording) - 1:
+        raise ParameterError(
+            f'the target is given in frame {start}, which is the last: nothing after it to explain'
+        )
     if not start < asked < len(recording):
         raise ParameterError(
             f'--frame {asked}: the target is given in frame {start}, so give a frame from '
