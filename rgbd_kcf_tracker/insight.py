@@ -105,7 +105,7 @@ class Insight:
 
 COMPUTED_BY: dict[str, tuple[Callable[..., Any], ...]] = {
     'surfaces': (surfaces_in,),
-    'particles': (HiddenCloud.step,),
+    'particles': (HiddenCloud.move, HiddenCloud.weigh),
     'considered': (evidence.probability, evidence.Evidence.features),
     'gallery': (View.of, Gallery.learn),
 }

@@ -51,6 +51,7 @@ from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, 
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.drawn import Drawn, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
+from rgbd_kcf_tracker.metric.identity.appearance import Appearance
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import (
@@ -395,6 +396,25 @@ def test_who_was_hidden_may_have_turned_round_meanwhile(missed: bool):
     ahead, back = one.place_log_odds(np.array([one.expected(1.8), [1.4, 3.0]]), 1.8)
     assert (ahead - back < 1) == missed
     assert (back > 0) == missed, 'he rather than anybody'
+
+
+def test_who_was_followed_where_depth_shows_nothing_may_have_turned_round_there():
+    """He was sought where he had gone on to, and was somebody new when he came back."""
+    one = Person(1, np.array([0.0, 3.0]), 0.0, chosen=True)
+    one.velocity = np.array([1.2, 0.0])
+    nothing = np.zeros((ROWS, COLS), np.float32)
+    places = []
+    for by_look in (False, True):
+        if by_look:
+            one.placed(np.array([0.0, 3.0]), 0.0)
+        else:
+            one.hidden = False  # the camera has seen past where depth showed him last
+        one.missed(nothing)
+        assert one.hidden == by_look
+        places.append(one.place_log_odds(np.array([[0.0, 3.0], [1.2, 3.0]]), 1.0))
+    (back, on), (back_by_look, on_by_look) = places
+    assert back < on - 1.0
+    assert back_by_look == pytest.approx(on_by_look, abs=0.7)
 
 
 def test_the_place_says_less_the_longer_somebody_is_away():
@@ -2700,3 +2720,18 @@ def test_every_step_is_taken_in_once(monkeypatch: pytest.MonkeyPatch):
         assert calls.index(after[0]) == len(calls) - 1
         outcomes.update(after)
     assert outcomes == {'take', 'miss', 'seen_elsewhere'}
+
+
+@pytest.mark.parametrize('cells', [47, 48])
+@pytest.mark.parametrize('color_share', [0.0, 0.1, 1.0])
+def test_a_look_is_found_where_it_was_learned_whatever_its_colours_count(
+    cells: int, color_share: float
+) -> None:
+    random, box = np.random.default_rng(3), Box(290, 160, 60, 160)
+    color = cv2.GaussianBlur(random.integers(60, 120, (480, 640, 3)).astype(np.uint8), (0, 0), 3)
+    color[160:320, 290:350] += np.array([0, 0, 100], np.uint8)
+    look = Appearance(
+        color, box, cells=cells, padding=3.0, sigma=1.8, rate=0.02, color_share=color_share
+    )
+    found = look.look(color, box.cx, box.cy, 1.0)
+    assert (found.cx, found.cy) == pytest.approx((box.cx, box.cy), abs=0.5)  # a cell is 8 pixels

@@ -394,7 +394,8 @@ def test_particles_die_where_the_camera_sees_past_them():
     depth[:, 120:] = 1.5  # a board over the right half: what is left of the target is behind it
     hidden = cloud()
     for _ in range(30):
-        hidden.step(1 / 30, view_of(depth), 0.5)
+        hidden.move(1 / 30)
+        hidden.weigh(1 / 30, view_of(depth), 0.5)
     assert hidden.mean[0] > 0.1
     left = hidden.distance(np.array([-0.3, -0.5, 2.5]), np.full(3, 0.05))
     right = hidden.distance(np.array([0.3, -0.5, 2.5]), np.full(3, 0.05))
@@ -407,9 +408,21 @@ def test_particles_spread_with_time_not_with_frames():
     for rate in (5, 30):
         hidden = cloud(4000)
         for _ in range(rate):
-            hidden.step(1 / rate, view_of(depth), 0.5)
+            hidden.move(1 / rate)
+            hidden.weigh(1 / rate, view_of(depth), 0.5)
         spreads.append(hidden.believed[1][0, 0] ** 0.5)
     assert spreads[0] == pytest.approx(spreads[1], rel=0.2)
+
+
+def test_what_is_seen_past_a_particle_is_the_pixel_nearest_to_it():
+    view = view_of(wall(5.0))
+    view.depth[:, 100] = 1.5  # a pole
+    k = view.intrinsics
+    still = np.zeros(3)
+    for column, seen in ((99.6, False), (100.4, False), (99.4, True), (100.6, True), (-0.6, False)):
+        place = np.array([(column - k.cx) * 2.0 / k.fx, 0.0, 2.0])
+        one = HiddenCloud(place, still, still, still, 1, np.random.default_rng(1))
+        assert one._seen_empty(view, 0.0).tolist() == [seen]
 
 
 # -- the body -------------------------------------------------------------------------------------

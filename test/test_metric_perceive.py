@@ -14,7 +14,7 @@ import pytest
 from people_rig import BLUE, CAMERA, COLS, ROWS, TOP, WALL, Someone, images, picture, texture
 
 from rgbd_kcf_tracker import Box, Frame
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, stands, upper_median
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.light import Light
@@ -648,6 +648,41 @@ def test_what_lasts_is_learned_ten_times_a_second_where_frames_come_fast(
     assert since.pop(0) > 0, 'the first frame teaches'
     assert list(since) == looks
     assert list(since.values()) == pytest.approx(np.diff([0, *looks]) / rate)
+
+
+def test_frames_without_depth_are_a_pause_to_what_depth_shows(monkeypatch: pytest.MonkeyPatch):
+    reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+    passed: list[float] = []
+    update = reader.room.update
+
+    def noticed(*given: Any) -> None:
+        passed.append(given[1])
+        update(*given)
+
+    monkeypatch.setattr(reader.room, 'update', noticed)
+    for i in range(10):
+        frame = picture([], i / 30)
+        if i % 3:
+            frame = dataclasses.replace(frame, depth=None)
+        assert (reader.read(frame, 1 / 30 if i else 0.0) is None) == bool(i % 3)
+    assert passed == pytest.approx([0.1, 0.1, 0.1])
+
+
+@pytest.mark.parametrize(
+    ('box', 'rows', 'cols'),
+    [
+        (Box(10, 20, 10, 5), (20, 25), (10, 20)),
+        (Box(10.5, 20.2, 9, 5), (20, 26), (10, 20)),
+        (Box(10.2, 20.9, 0.5, 0.05), (20, 21), (10, 11)),
+        (Box(-5, -5, 1000, 1000), (0, 40), (0, 60)),
+        (Box(-10, 0, 10, 10), (0, 10), (0, 0)),
+        (Box(60, 40, 10, 10), (40, 40), (60, 60)),
+    ],
+)
+def test_a_box_has_the_pixels_that_it_touches(
+    box: Box, rows: tuple[int, int], cols: tuple[int, int]
+):
+    assert part_in((40, 60, 3), box) == (slice(*rows), slice(*cols))
 
 
 def test_a_camera_that_moves_learns_from_every_frame():

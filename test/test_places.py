@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from people_rig import COLS, ROWS, Someone, picture
 
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import LIMIT, Place, coverage, place_of
@@ -309,3 +310,20 @@ def test_a_report_says_how_many_places_lie_inside(
     assert 'kcf, seen' not in said
     assert (report / 'tables' / 'places.csv').is_file()
     assert 'Places in metres' in (report / 'index.html').read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize('depth', [True, False])
+def test_a_hidden_target_may_be_the_farther_off_the_longer_it_is_not_read(depth: bool) -> None:
+    tracker = create_tracker('metric', MetricParameters(use_look=False))
+    one, spreads = Someone(0.1, 3.0), []
+    for i in range(20):
+        frame = picture([one], 0.1 * i)
+        if i >= 6:  # a board over all of it
+            frame = dataclasses.replace(frame, depth=np.full((ROWS, COLS), 0.8, np.float32))
+        if i >= 8 and not depth:
+            frame = dataclasses.replace(frame, depth=None)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        if i >= 7:
+            spreads.append(float(np.sqrt(np.trace(np.reshape(track.covariance, (3, 3))))))
+    assert spreads[-1] > 2 * spreads[0]
+    assert (np.diff(spreads) > 0).mean() > 0.8

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import array
 import sys
+import time
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -25,9 +26,11 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, RgbdKcfError, Track, TrackState
+from rgbd_kcf_tracker.live.places import Places
 from rgbd_kcf_tracker.live.processor import Capture, Processor, in_picture
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.camera_info import Camera, camera_from_info
 from rgbd_kcf_tracker.recordings.images import decode_color, decode_depth
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
@@ -302,3 +305,17 @@ def test_boxes_are_of_what_lies_in_the_picture(box: Box, shown: Box | None) -> N
     track = in_picture(Track(box, TrackState.TRACKING, 0.7, 2.0), frame)
     assert track.box == shown
     assert track.state is (TrackState.OCCLUDED if shown is None else TrackState.TRACKING)
+
+
+def test_who_is_chosen_on_the_newest_image_is_chosen_where_the_camera_was() -> None:
+    here = Pose(np.eye(3), np.array([0.5, 0.0, 0.0]))
+    told = SimpleNamespace(at=lambda _: Places(here), judged=lambda places, _: places)
+    faults: list[str] = []
+    made = processor(faults, places=told)
+    color: Any = image_message(HEADER, np.full((48, 64, 3), 90, np.uint8), 'bgr8')
+    made(Capture(color, None, None, time.monotonic_ns()))
+    started: list[Frame] = []
+    made.session.start_as_asked = started.append  # type: ignore[method-assign]
+    made.choose(lambda _: Box(10, 10, 20, 20), 1.0)
+    assert [frame.pose for frame in started] == [here]
+    assert not faults

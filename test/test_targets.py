@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -318,6 +319,20 @@ def test_everyone_gets_an_id_without_being_chosen_and_it_comes_back():
     assert len(targets) == 0, 'nobody was chosen'
 
 
+def test_who_has_an_id_keeps_it_where_a_frame_has_no_depth():
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(30):
+        before = targets.update(comers(i))
+    assert len(before) == 2
+    without = targets.update(dataclasses.replace(comers(30), depth=None))
+    assert {n: track.state for n, track in without.items()} == dict.fromkeys(
+        before, TrackState.OCCLUDED
+    )
+    after = targets.update(comers(31))
+    assert {n for n, track in after.items() if track.box is not None} == set(before)
+
+
 def test_a_thing_that_is_chosen_twice_in_a_frame_is_one_target():
     """The second was something else at the same place, which then was not seen again."""
     box = Box(110, 40, 50, 60)
@@ -538,6 +553,32 @@ def test_a_frame_carries_its_pose_and_its_camera():
     assert there.camera == 'door'
     with pytest.raises(ImageError):
         dataclasses.replace(there, depth=np.zeros((3, 3), np.float32))
+
+
+def test_an_image_that_is_masked_or_of_another_kind_is_taken_for_what_it_shows():
+    frame = both(0)
+    hidden = np.zeros(frame.depth.shape, bool)
+    hidden[:10] = True
+    masked = Frame(frame.color, np.ma.masked_array(frame.depth, hidden))
+    assert type(masked.depth) is np.ndarray
+    assert (np.isnan(masked.depth) == hidden).all()
+    assert type(Frame(frame.color, np.asmatrix(frame.depth)).depth) is np.ndarray
+    assert type(Frame(np.ma.masked_array(frame.color, False)).color) is np.ndarray
+
+
+@pytest.mark.parametrize(
+    ('color', 'depth', 'stamp', 'says'),
+    [
+        ([[1]], None, 0, 'colour image is a list: give an array'),
+        (None, None, 0, 'colour image is a NoneType'),
+        (np.zeros((2, 2, 3), np.uint8), [[1.0]], 0, 'depth image is a list'),
+        (np.zeros((2, 2, 3), np.uint8), None, 1.5, 'stamp_ns is 1.5: give whole nanoseconds'),
+        (np.zeros((2, 2, 3), np.uint8), None, float('nan'), 'stamp_ns is nan'),
+    ],
+)
+def test_what_is_no_image_or_no_stamp_is_refused(color: Any, depth: Any, stamp: Any, says: str):
+    with pytest.raises(ImageError, match=says):
+        Frame(color, depth, stamp)
 
 
 def test_a_target_is_kept_in_the_world_by_the_poses_of_a_moving_camera():

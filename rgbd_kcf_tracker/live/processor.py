@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Instant, Timeline
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
 from rgbd_kcf_tracker.recordings.images import (
@@ -91,6 +92,15 @@ def in_picture(track: Track, frame: Frame) -> Track:
     return replace(track, box=shown)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Answered:
+    """The newest pair, its time and where the camera was, as far as that is known."""
+
+    capture: Capture
+    time_ns: int
+    pose: Pose | None
+
+
 class Processor:
     """Decodes what is needed, asks the session, publishes, counts.
 
@@ -125,7 +135,7 @@ class Processor:
         self._fault = fault
         self._places = places
         self._timeline = Timeline()
-        self._last: tuple[Capture, int] | None = None
+        self._last: _Answered | None = None
         self._frame_id: str | None = None
         self._restarts = self._steady = 0
         self.on_restart: Callable[[], None] | None = None
@@ -197,7 +207,7 @@ class Processor:
                 publish=(published - tracked) / 1e6,
             )
         )
-        self._last = capture, moment.time_ns
+        self._last = _Answered(capture, moment.time_ns, None if frame is None else frame.pose)
         if frame is not None:
             try:
                 session.settle()
@@ -224,12 +234,12 @@ class Processor:
     def _start_at_once(self, oldest_s: float) -> None:
         if self._last is None or not self.session.due:
             return
-        capture, time_ns = self._last
-        if (time.monotonic_ns() - capture.arrival_ns) / 1e9 <= oldest_s:
+        last = self._last
+        if (time.monotonic_ns() - last.capture.arrival_ns) / 1e9 <= oldest_s:
             with self.session.charged():
-                frame = self.frame(capture, time_ns)
+                frame = self.frame(last.capture, last.time_ns)
             if frame is not None:
-                self.session.start_as_asked(frame)
+                self.session.start_as_asked(replace(frame, pose=last.pose))
 
     def frame(self, capture: Capture, time_ns: int) -> Frame | None:
         """The pair as a frame; without depth where that cannot be used; None without a picture."""

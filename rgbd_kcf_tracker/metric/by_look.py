@@ -29,6 +29,7 @@ from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilte
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 
 LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window, and from which other places are
@@ -525,12 +526,8 @@ def depth_in(frame: Frame, box: Box) -> float | None:
     """Median depth in the middle of a box in metres, None where most of it has no reading."""
     if frame.depth is None:
         return None
-    middle = box.scaled(0.5).clipped(frame.width, frame.height)
-    if middle is None:
-        return None
-    step = max(1, int(min(middle.width, middle.height) // DEPTH_SAMPLES))
-    depth = frame.depth[
-        int(middle.y) : int(middle.bottom) + 1 : step, int(middle.x) : int(middle.right) + 1 : step
-    ]
+    middle = frame.depth[part_in(frame.depth.shape, box.scaled(0.5))]
+    step = max(1, min(middle.shape) // DEPTH_SAMPLES)
+    depth = middle[::step, ::step]
     valid = depth[is_reading(depth)]
     return float(np.median(valid)) if valid.size > MOST * depth.size else None

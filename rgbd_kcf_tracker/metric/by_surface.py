@@ -158,7 +158,6 @@ class BySurface:
             which must be called.
         """
         scene = account.scene
-        following = self.hidden_for == 0.0
         self.was_away = absent(self.hidden_for + dt, self._misses)
         self._dt = dt
         if self._person.figure:
@@ -168,12 +167,9 @@ class BySurface:
             self.motion.carried(scene.motion)
             if self._cloud is not None:
                 self._cloud.carried(scene.motion)
-        self.motion.predict(dt, 1.0 if following else HIDDEN_NOISE)
-        self._middle.predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
-        if following:
-            self._cloud = None
-        elif self._parameters.use_particles:
-            self._step_cloud(scene, dt)
+        self._predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
+        if self._cloud is not None:
+            self._cloud.weigh(dt, scene.view, PLACED_MIDDLE * self.body.height)
         expected = self.expected(dt)
         missing = self.expected_body.visible(scene) > 0.6
         others = account.others(self._person)
@@ -248,8 +244,7 @@ class BySurface:
     def drift(self, dt: float) -> None:
         """Go on by ``dt`` seconds without a picture of depth."""
         self.was_away = absent(self.hidden_for + dt, self._misses)
-        self.motion.predict(dt)
-        self._middle.predict(dt)
+        self._predict(dt, None)
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
@@ -334,9 +329,15 @@ class BySurface:
             reach = reach + 10.0
         return Expectation(self.motion.position, sigma, reach)
 
-    def _step_cloud(self, scene: Scene, dt: float) -> None:
+    def _predict(self, dt: float, moved: Pose | None) -> None:
+        """Go on by ``dt`` seconds, with particles while the target is hidden."""
+        motion, hidden = self.motion, self.hidden_for > 0
+        motion.predict(dt, HIDDEN_NOISE if hidden else 1.0)
+        self._middle.predict(dt, moved)
+        if not hidden or not self._parameters.use_particles:
+            self._cloud = None
+            return
         if self._cloud is None:
-            motion = self.motion
             self._cloud = HiddenCloud(
                 motion.position,
                 motion.velocity,
@@ -345,7 +346,7 @@ class BySurface:
                 self._parameters.particles,
                 self._rng,
             )
-        self._cloud.step(dt, scene.view, PLACED_MIDDLE * self.body.height)
+        self._cloud.move(dt)
 
     def _weighed(
         self, account: Account, frame: Frame, found: list[Silhouette], dt: float, missing: bool

@@ -14,6 +14,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook
 from rgbd_kcf_tracker.metric.decide.account import STATURE
 from rgbd_kcf_tracker.metric.identity.gallery import LEAST_PIXELS, SLICES, Gallery, View
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Sides, Silhouette
 
@@ -49,7 +50,7 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
     """
     view, k = scene.view, scene.view.intrinsics
     b = box.over(view.step)
-    rows, cols = view.part(b.x, b.y, b.right, b.bottom)
+    rows, cols = part_in(view.shape, b)
     tall = rows.stop - rows.start
     if tall < SLICES or b.y == 0:  # a box that ends where the image does was cut off there
         return None

@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 
@@ -267,8 +267,7 @@ class GatedLook:
 
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
-    b = box.scaled(MIDDLE).over(scene.view.step)
-    return scene.view.part(b.x, b.y, b.right, b.bottom)
+    return part_in(scene.view.shape, box.scaled(MIDDLE).over(scene.view.step))
 
 
 def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:
@@ -279,8 +278,7 @@ def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] 
     """
     box, depth, spread = look.box, look.depth, 0.0
     if depth is None:
-        b = box.scaled(ABOUT).over(view.step)
-        read = view.depth[view.part(b.x, b.y, b.right, b.bottom)]
+        read = view.depth[part_in(view.shape, box.scaled(ABOUT).over(view.step))]
         read = read[read > 0]
         if not read.size:
             return None

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -225,10 +224,7 @@ def _found_again(account: Account, piece: Silhouette, parameters: MetricParamete
 
 def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
     """``(k,)`` how many pixels of each surface a box shows."""
-    b, (rows, cols) = box.over(scene.view.step), scene.view.shape
-    x0, x1 = np.clip((math.floor(b.x), math.ceil(b.right)), 0, cols)
-    y0, y1 = np.clip((math.floor(b.y), math.ceil(b.bottom)), 0, rows)
-    labels = scene.surfaces.labels[y0:y1, x0:x1]
+    labels = scene.surfaces.labels[part_in(scene.view.shape, box.over(scene.view.step))]
     return np.bincount(labels.ravel(), minlength=len(scene.surfaces))
 
 
@@ -253,10 +249,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
 
     They stand before the room at about one depth, and belong to nothing that goes on beside it.
     """
-    step, (rows, cols) = scene.view.step, scene.view.shape
-    x0, x1 = max(0, round(box.x / step)), min(cols, round(box.right / step))
-    y0, y1 = max(0, round(box.y / step)), min(rows, round(box.bottom / step))
-    part = slice(y0, y1), slice(x0, x1)
+    part = rows, cols = part_in(scene.view.shape, box.over(scene.view.step))
     mine = scene.standing[part].copy()
     if np.count_nonzero(mine) < SCATTERED * mine.size:
         return None
@@ -283,7 +276,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     # So they are where the middle shows nothing: of the target, then, there is no reading at all.
     if own < CENTRED * np.count_nonzero(mine):
         return None
-    seen = Silhouette.trimmed(scene.view, x0, y0, mine, scene.rim)
+    seen = Silhouette.trimmed(scene.view, cols.start, rows.start, mine, scene.rim)
     if seen is None:
         return None
     # What little depth there is of a small thing in a hand may be the hand's.
@@ -336,12 +329,10 @@ def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
 
 def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
     """The part of a silhouette in the box that was drawn: what sticks out is something else."""
-    step, margin = scene.view.step, OUTSIDE
-    spare_x, spare_y = margin * box.width, margin * box.height
-    x0 = max(seen.left, int((box.x - spare_x) / step))
-    x1 = min(seen.cols.stop, int((box.right + spare_x) / step) + 1)
-    y0 = max(seen.top, int((box.y - spare_y) / step))
-    y1 = min(seen.rows.stop, int((box.bottom + spare_y) / step) + 1)
+    grown = box.scaled(1 + 2 * OUTSIDE).over(scene.view.step)
+    rows, cols = part_in(scene.view.shape, grown)
+    x0, x1 = max(seen.left, cols.start), min(seen.cols.stop, cols.stop)
+    y0, y1 = max(seen.top, rows.start), min(seen.rows.stop, rows.stop)
     if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
         return seen
     part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]

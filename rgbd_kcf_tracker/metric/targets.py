@@ -281,11 +281,19 @@ class MetricTargets:
 
     def _others(self, frame: Frame) -> dict[int, Track]:
         """Tracks of those whom nobody chose, as far as they are in view or were a moment ago."""
-        tracks: dict[int, Track] = {}
-        account = self.account
-        if account is None:
-            return tracks
         chosen = {f.person.number for f in self._followers.values() if f.person is not None}
+        tracks = {} if self.account is None else self._in_view(frame, self.account, chosen)
+        for person in self._crowd.people:
+            gone = self._time - person.seen_at
+            if person.number in self._names and person.number not in chosen and gone > 0:
+                name = self._names[person.number]
+                if gone < self._parameters.lost_after and name not in tracks:
+                    tracks[name] = Track(None, TrackState.OCCLUDED, id=name)
+        return tracks
+
+    def _in_view(self, frame: Frame, account: Account, chosen: set[int]) -> dict[int, Track]:
+        """Tracks of those in view whose numbers are not among the chosen ones."""
+        tracks: dict[int, Track] = {}
         # Who is followed as a target may to the account still be somebody new.
         shown = {
             account.sight_of(seen)
@@ -311,12 +319,6 @@ class MetricTargets:
                 id=self._name(person),
                 covariance=None if belief is None else row_by_row(belief.covariance),
             )
-        for person in account.people:
-            gone = account.time - person.seen_at
-            if person.number in self._names and person.number not in chosen and gone > 0:
-                name = self._names[person.number]
-                if gone < self._parameters.lost_after and name not in tracks:
-                    tracks[name] = Track(None, TrackState.OCCLUDED, id=name)
         return tracks
 
 

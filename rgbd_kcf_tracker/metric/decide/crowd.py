@@ -195,12 +195,12 @@ class Crowd:
         if isinstance(scene.motion, Lost):
             self._mix_ups = MixUps()
             for person in self.people:
-                person.mobile, person.last = False, None
+                person.mobile, person.last, person.hidden = False, None, False
         if scene.view.shape != self._shape:
             # The pixels of a picture of another size are no places in this one.
             self._shape = scene.view.shape
             for person in self.people:
-                person.last = None
+                person.last, person.hidden = None, False
         if isinstance(scene.motion, Pose):
             for person in self.people:
                 person.carried(scene.motion, self._axes, scene.axes)

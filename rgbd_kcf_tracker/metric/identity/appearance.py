@@ -142,9 +142,9 @@ class Appearance:
         return self._colors.of(rgb_codes(color))
 
     def cells(self, cx: float, cy: float, scale: float) -> tuple[FloatArray, FloatArray]:
-        """Columns and rows, ``(cells,)`` pixels each, of the cells of a window about ``cx, cy``."""
+        """Columns and rows, ``(cells,)`` pixels, where a window about ``cx, cy`` is asked."""
         n = self._cells
-        place = (np.arange(n, dtype=np.float64) + 0.5 - n / 2) * (self._base * scale / n)
+        place = (np.arange(n, dtype=np.float64) - n // 2) * (self._base * scale / n)
         return cx + place, cy + place
 
     def look(
@@ -169,6 +169,8 @@ class Appearance:
             size = (int(self._target[0]) | 1, int(self._target[1]) | 1)
             mean = cv2.boxFilter(posterior, -1, size, borderType=cv2.BORDER_REPLICATE)
             mean = cv2.resize(mean, (self._cells, self._cells), interpolation=cv2.INTER_AREA)
+            if self._cells % 2 == 0:  # the response is that of the corners between four cells
+                mean = cv2.blur(mean, (2, 2), borderType=cv2.BORDER_REPLICATE)
             total = (1 - self._share) * response + self._share * fft.ifftshift(mean)
         if possible is not None:
             possible = fft.ifftshift(possible)

@@ -71,20 +71,23 @@ class HiddenCloud:
         self._positions = motion.of(self._positions)
         self._velocities = self._velocities @ motion.rotation.T
 
-    def step(self, dt: float, view: DepthView, middle: float) -> None:
-        """Move on by ``dt`` seconds and weigh by what the camera sees.
-
-        Args:
-            dt: seconds.
-            view: the depth of now.
-            middle: metres from the reference point down to the middle of the target.
-        """
+    def move(self, dt: float) -> None:
+        """Go on by ``dt`` seconds."""
         keep = np.exp(-dt / TURN_TIME)
         noise = ROAM * np.sqrt(1 - keep**2)
         self._velocities *= keep
         self._velocities += noise * self._rng.standard_normal(self._velocities.shape)
         self._positions += self._velocities * dt
         np.maximum(self._positions[:, 2], 0.2, out=self._positions[:, 2])
+
+    def weigh(self, dt: float, view: DepthView, middle: float) -> None:
+        """Weigh by what the camera sees.
+
+        Args:
+            dt: seconds for which it has seen that.
+            view: the depth of now.
+            middle: metres from the reference point down to the middle of the target.
+        """
         self._weights *= np.where(self._seen_empty(view, middle), np.exp(-dt / EMPTY_TIME), 1.0)
         total = self._weights.sum()
         if total < 1e-12:
@@ -102,8 +105,8 @@ class HiddenCloud:
         k = view.intrinsics
         rows, cols = view.shape
         x, y, z = self._positions.T
-        u = (x * k.fx / z + k.cx).astype(np.int32)
-        v = ((y + middle) * k.fy / z + k.cy).astype(np.int32)
+        u = np.rint(x * k.fx / z + k.cx).astype(np.int32)
+        v = np.rint((y + middle) * k.fy / z + k.cy).astype(np.int32)
         inside = (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
         seen = view.depth[np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)]
         empty: npt.NDArray[np.bool_] = inside & (seen > z + EMPTY_MARGIN)

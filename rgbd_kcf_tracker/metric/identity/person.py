@@ -77,7 +77,8 @@ class Person:
         mobile: whether it was seen before a room that is known: what stands still is not it.
         area: square metres, the most that was seen of it.
         entered: whether it was first seen at the edge of what the camera sees.
-        last: the silhouette of the last sight, None where the camera has moved since.
+        last: the silhouette of the last sight, None where the camera has moved since, or where
+            depth showed nothing of it.
         hidden: whether it may still stand there, as nothing beyond that place has shown since.
         upright: whether it ever had the shape of a person.
         figure: whether it was a figure when it was last seen, and not a thing too small for one.
@@ -148,6 +149,7 @@ class Person:
     def placed(self, place: FloatArray, time: float) -> None:
         """Take where it is, ``(2,)`` metres, by other means: depth shows nothing of it."""
         self.place, self.seen_at, self.misses = place, time, 0
+        self.last, self.hidden = None, True
 
     def missed(self, depth: DepthArray) -> None:
         """Take a frame in which it was not found.
@@ -157,7 +159,6 @@ class Person:
         """
         self.misses += 1
         if self.last is None or not self.hidden:
-            self.hidden = False
             return
         there = depth[self.last.rows, self.last.cols][self.last.mask]
         past = int(np.count_nonzero(there > self.last.depth + BEYOND))
@@ -253,7 +254,7 @@ class Person:
             axes: of places so far, ``(2, 3)``, see :attr:`~.perceive.scene.Scene.axes`.
             now: those from now on.
         """
-        self.last = None
+        self.last, self.hidden = None, False
         turned = now @ motion.rotation @ axes.T
         # The floor of two frames differs by some noise, and no place is to grow by that.
         turn = math.atan2(turned[1, 0] - turned[0, 1], turned[0, 0] + turned[1, 1])

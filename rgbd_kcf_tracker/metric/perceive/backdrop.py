@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in, part_of
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import (
     LEAST_CORNERS,
     changed,
@@ -420,5 +420,5 @@ def _ended(outline: Box, box: Box, known: Mask) -> Box:
 
 
 def _mostly(known: Mask, left: float, top: float, right: float, bottom: float) -> bool:
-    part = known[part_of(known.shape, left, top, right - 1, bottom - 1)]
+    part = known[part_in(known.shape, Box.from_corners(left, top, right, bottom))]
     return part.size > 0 and float(part.mean()) > LEAST_KNOWN

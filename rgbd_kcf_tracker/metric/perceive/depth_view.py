@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,20 +17,13 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 DepthArray = npt.NDArray[np.float32]
 
 
-def part_of(
-    shape: tuple[int, ...], left: float, top: float, right: float, bottom: float
-) -> tuple[slice, slice]:
-    """Rows and columns of what lies between these pixels, as far as it is in an image."""
+def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
+    """Rows and columns of all pixels that a box touches, as far as they are in an image."""
     rows, cols = shape[:2]
     return (
-        slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
-        slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
+        slice(math.floor(min(max(box.y, 0), rows)), math.ceil(min(max(box.bottom, 0), rows))),
+        slice(math.floor(min(max(box.x, 0), cols)), math.ceil(min(max(box.right, 0), cols))),
     )
-
-
-def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
-    """Rows and columns of what a box covers, as far as it is in an image."""
-    return part_of(shape, box.x, box.y, box.right, box.bottom)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +66,12 @@ class DepthView:
         )
 
     def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
-        """Rows and columns of what lies between these pixels, as far as it is in the view."""
-        return part_of(self.shape, left, top, right, bottom)
+        """Rows and columns from one pixel's to another's, as far as they are in the view."""
+        rows, cols = self.shape
+        return (
+            slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
+            slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
+        )
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -140,15 +140,19 @@ class SceneReader:
         self.somebody: npt.NDArray[np.bool_] | None = None
         self.last_view: DepthView | None = None
         self.stood_for = math.inf
+        self._unread = 0.0
 
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
         self.seems = None
-        self._learned += seconds
-        self._taught += seconds
+        self._unread += seconds
         view = DepthView.of(frame, self._width)
         if view is None:
             return None
+        # To what depth shows the frames without it are a pause.
+        seconds, self._unread = self._unread, 0.0
+        self._learned += seconds
+        self._taught += seconds
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
@@ -267,7 +271,7 @@ class SceneReader:
             before = np.zeros(view.shape, np.bool_)
         seems = self._ego.update(image, view, before, seconds)
         self.seems = seems if isinstance(seems, Pose) else None
-        if last is None or now is None:
+        if last is None or now is None:  # a pose after one that is missing may be of another map
             self._pose = now
             return seems
         moved = last.after(now.inverse)
