@@ -99,6 +99,17 @@ class Pose:
         """The other frame's place in this one."""
         return Pose(self.rotation.T, -self.rotation.T @ self.translation)
 
+    @property
+    def shift(self) -> float:
+        """Metres from one frame's origin to the other's."""
+        return float(np.linalg.norm(self.translation))
+
+    @property
+    def turn(self) -> float:
+        """Radians between the two frames."""
+        cosine = (float(np.trace(self.rotation)) - 1) / 2
+        return math.acos(min(max(cosine, -1.0), 1.0))
+
     def of(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Points of this frame in the other, ``(..., 3)`` metres."""
         moved: npt.NDArray[np.float64] = points @ self.rotation.T + self.translation

@@ -19,10 +19,8 @@ from rgbd_kcf_tracker.evaluation.metrics import (
     compare,
     confusion,
     mean,
-    measure,
     measure_boxes,
     otb,
-    pooled_counts,
     presence,
     princeton,
 )
@@ -298,12 +296,6 @@ def test_mean_is_over_sequences_and_skips_what_a_sequence_does_not_have():
     assert both.recall_of_absence == 1
     assert math.isnan(mean([]).success)
     assert math.isnan(mean([short]).tn)
-
-
-def test_pooled_counts_add_up():
-    parts = [compare(SAID, THERE, skip=0), compare([TRUTH], [TRUTH], skip=0)]
-    assert pooled_counts(parts) == confusion.Counts(tp=5, fp=2, tn=3, fn=1)
-    assert measure(parts[1]).tp == 1
 
 
 def present_as(pattern: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

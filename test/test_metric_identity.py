@@ -1472,8 +1472,12 @@ def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
     walker = crowd.welcome(np.zeros(2), 0.5)
     walker.travelled = 2.0
     for i in range(3 * MOST_PEOPLE):
-        crowd.welcome(np.zeros(2), 1.0 + i)
+        one = crowd.welcome(np.zeros(2), 1.0 + i)
+        one.meet(chosen)
+        chosen.resembled(one.number, 1.0, 1.0, 1.0 + i)
     assert len(crowd.people) == MOST_PEOPLE + 1
+    assert chosen.met == {person.number for person in crowd.people} - {1, 2}
+    assert set(chosen._resembles) == chosen.met, 'nothing grows with who came and went'
     assert chosen in crowd.people
     assert walker in crowd.people, 'things that were moved are forgotten before people'
     numbers = [person.number for person in crowd.people]

@@ -114,16 +114,10 @@ class Pairs:
 
 def metric_views() -> Views:
     """How the ``metric`` tracker describes and compares people; new ones for a recording."""
-    from rgbd_kcf_tracker.metric.decide.visible_box import (  # type: ignore[attr-defined]
-        outline_box,
-    )
-    from rgbd_kcf_tracker.metric.identity.gallery import (  # type: ignore[import-not-found]
-        same_person,
-    )
+    from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
+    from rgbd_kcf_tracker.metric.identity.gallery import same_person
     from rgbd_kcf_tracker.metric.parameters import MetricParameters
-    from rgbd_kcf_tracker.metric.targets import (  # type: ignore[import-not-found]
-        MetricTargets,
-    )
+    from rgbd_kcf_tracker.metric.targets import MetricTargets
 
     targets = MetricTargets(MetricParameters())
     targets.everyone = True

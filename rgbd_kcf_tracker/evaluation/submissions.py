@@ -13,8 +13,6 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
-FORMATS = ('princeton', 'vot')
-
 
 def write_princeton(path: Path, boxes: FloatArray) -> None:
     """One line per frame: ``x1,y1,x2,y2,state``; ``NaN,NaN,NaN,NaN,1`` where the target is hidden.

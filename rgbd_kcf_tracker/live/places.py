@@ -10,8 +10,6 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-
 from rgbd_kcf_tracker.pose import Pose
 
 FASTEST, SLACK = 5.0, 0.1
@@ -76,7 +74,8 @@ class PoseWatch:
         last, self._last = self._last, (pose, stamp_ns)
         if last is None:
             return ''
-        shift, turn = size_of(last[0].after(pose.inverse))
+        moved = last[0].after(pose.inverse)
+        shift, turn = moved.shift, moved.turn
         seconds = abs(stamp_ns - last[1]) * 1e-9
         if shift > FASTEST * seconds + SLACK:
             return f'jumped by {shift:.2f} m in {seconds:.2f} s'
@@ -101,17 +100,10 @@ class Standstill:
         """Take a picture's told pose and seen motion; whether the poses are to be disbelieved."""
         last, self._last = self._last, pose
         if pose is not None and last is not None:
-            told_shift, told_turn = size_of(last.after(pose.inverse))
-            shift, turn = (0.0, 0.0) if seems is None else size_of(seems)
-            moving = shift > SEEN_SHIFT or turn > SEEN_TURN
-            told = told_shift > TOLD_SHARE * SEEN_SHIFT or told_turn > TOLD_SHARE * SEEN_TURN
-            self._seen.append(moving and not told)
+            told = last.after(pose.inverse)
+            moving = seems is not None and (seems.shift > SEEN_SHIFT or seems.turn > SEEN_TURN)
+            moves = told.shift > TOLD_SHARE * SEEN_SHIFT or told.turn > TOLD_SHARE * SEEN_TURN
+            self._seen.append(moving and not moves)
         count = sum(self._seen)
         self.noticed = count >= CONTRADICTED or (self.noticed and count > CLEARED)
         return self.noticed
-
-
-def size_of(motion: Pose) -> tuple[float, float]:
-    """Metres and radians of a motion."""
-    cosine = (float(np.trace(motion.rotation)) - 1) / 2
-    return float(np.linalg.norm(motion.translation)), math.acos(min(max(cosine, -1.0), 1.0))

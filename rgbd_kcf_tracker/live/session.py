@@ -417,7 +417,7 @@ class Session:
         try:
             for track in (self.track, *self.others):
                 if track.id in known and track.box is not None and _shown(track, frame):
-                    ids[targets.add(frame, track.box)] = track.id
+                    ids.setdefault(targets.add(frame, track.box), track.id)
         except RgbdKcfError as error:
             self._report(str(error))
             self._wanted = (self._variant, self._parameters)

@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, describe, parameter
 from rgbd_kcf_tracker.recordings import camera_info
 from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE
+from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S
 from rgbd_kcf_tracker.recordings.whereabouts import POSE_PREDICTION_S
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
 
@@ -75,7 +76,7 @@ class NodeParameters(Parameters):
         choices=(KEEP, RESTART),
     )
     pair_tolerance: float = parameter(
-        0.02,
+        DEFAULT_TOLERANCE_S,
         'Largest difference between the stamps of a colour image and its depth image.',
         unit='s',
         minimum=0.0,

@@ -68,7 +68,7 @@ class Timeline:
             restarted = step < 0 and not returned
             self._before_jump = self._stamp if step > 0 else None
             step = waited
-        elif self._before_jump is not None and step <= LARGEST_STEP_NS:
+        elif self._before_jump is not None:
             self._before_jump = None  # two images on the new course: it is the course now
         self._time += step
         self._stamp, self._arrival = stamp_ns, arrival_ns

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.identity.appearance import FRAME, MAX_RATE, Appearance, Sighting
+from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting, share_after
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
 from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilter
@@ -239,7 +239,7 @@ class ByLook:
 
     def _learn(self, frame: Frame, seconds: float) -> None:
         self._appearance.learn(frame.color, self._cx, self._cy, self._scale, seconds)
-        rate = min(MAX_RATE, SCALE_RATE * seconds / FRAME)
+        rate = share_after(SCALE_RATE, seconds)
         self._scales.learn(frame.color, self._cx, self._cy, *self._size, rate)
 
     def glance(self, frame: Frame, box: Box, dt: float, goes_on: bool) -> Look | None:

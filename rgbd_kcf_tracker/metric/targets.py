@@ -282,6 +282,8 @@ class MetricTargets:
     def _others(self, frame: Frame) -> dict[int, Track]:
         """Tracks of those whom nobody chose, as far as they are in view or were a moment ago."""
         chosen = {f.person.number for f in self._followers.values() if f.person is not None}
+        numbers = {person.number for person in self._crowd.people}
+        self._names = {n: name for n, name in self._names.items() if n in numbers}
         tracks = {} if self.account is None else self._in_view(frame, self.account, chosen)
         for person in self._crowd.people:
             gone = self._time - person.seen_at

@@ -29,7 +29,7 @@ from rgbd_kcf_tracker.recordings.storage import (
 )
 
 MAGIC = b'#ROSBAG V2.0\n'
-_MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = 2, 3, 4, 5, 6, 7
+_MESSAGE, _BAG, _CHUNK, _CONNECTION = 2, 3, 5, 7
 _U32 = struct.Struct('<I')
 _MAX_HEADER = 1 << 20
 

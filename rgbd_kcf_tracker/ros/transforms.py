@@ -18,7 +18,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.time import Time
 
 from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
-from rgbd_kcf_tracker.live.places import Places, PoseWatch, Standstill, size_of
+from rgbd_kcf_tracker.live.places import Places, PoseWatch, Standstill
 from rgbd_kcf_tracker.live.settings import NodeParameters
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.messages import header_stamp, stamp_of
@@ -120,10 +120,11 @@ class Transforms:
             self._travelled = (places.fixed, places.target)
             return
         fixed, target = self._travelled
-        if max(size_of(fixed.after(places.fixed.inverse))) < MOVED:
+        moved = fixed.after(places.fixed.inverse)
+        if max(moved.shift, moved.turn) < MOVED:
             return
-        shift, turn = size_of(target.after(places.target.inverse))
-        self._carried = shift < CARRIED_SHIFT and turn < CARRIED_TURN
+        beside = target.after(places.target.inverse)
+        self._carried = beside.shift < CARRIED_SHIFT and beside.turn < CARRIED_TURN
         self._travelled = (places.fixed, places.target)
 
     def forget(self) -> None:

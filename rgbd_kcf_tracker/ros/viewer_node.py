@@ -38,6 +38,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_depth,
 )
 from rgbd_kcf_tracker.recordings.messages import stamp_of, tracks_of_state
+from rgbd_kcf_tracker.recordings.pairing import DEFAULT_TOLERANCE_S
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES
 from rgbd_kcf_tracker.ros.names import tracker_topics
@@ -58,7 +59,9 @@ POLL_S = 0.05
 SETTINGS_S = 2.0
 LINGER_S = 3.0
 """Seconds after the last browser has gone in which the images are still listened to."""
-PAIR_NS = 20_000_000
+PAIR_NS = round(DEFAULT_TOLERANCE_S * 1e9)
+"""Between the stamps of an image and its depth at the most. A page shows what there is: it waits
+for no pair to be sure, as a :class:`StampPairer` does."""
 _MAKE = TrackMessages(ROS_TYPES)
 HELD = 6
 """Images that are kept for their partner."""

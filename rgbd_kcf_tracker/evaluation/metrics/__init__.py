@@ -15,7 +15,6 @@ from rgbd_kcf_tracker.evaluation.metrics.summary import (
     mean,
     measure,
     measure_boxes,
-    pooled_counts,
 )
 
 __all__ = [
@@ -25,5 +24,4 @@ __all__ = [
     'mean',
     'measure',
     'measure_boxes',
-    'pooled_counts',
 ]

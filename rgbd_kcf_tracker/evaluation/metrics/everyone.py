@@ -12,9 +12,7 @@ Multi-Object Tracking", 2021 (HOTA); Milan et al., "MOT16", 2016 (what does not 
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -25,6 +23,7 @@ from scipy.optimize import linear_sum_assignment
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics.calibration import SURE
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU
+from rgbd_kcf_tracker.evaluation.metrics.means import mean_of
 from rgbd_kcf_tracker.evaluation.metrics.presence import (
     HIT_SHARE,
     JUDGED_FROM,
@@ -139,12 +138,7 @@ def score(truth: Sightings, tracks: Sightings, bodies: FloatArray | None = None)
 
 def mean(scores: Iterable[Everyone]) -> Everyone:
     """Mean over recordings, each counting once; a NaN does not count."""
-    rows = np.array([dataclasses.astuple(s) for s in scores], np.float64)
-    if not len(rows):
-        return Everyone(*[math.nan] * len(dataclasses.fields(Everyone)))
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore', RuntimeWarning)  # a measure that no recording has
-        return Everyone(*[float(v) for v in np.nanmean(rows, axis=0)])
+    return mean_of(Everyone, scores)
 
 
 def overlaps(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +21,7 @@ from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.evaluation.metrics import confusion, otb, presence, princeton
 from rgbd_kcf_tracker.evaluation.metrics.boxes import Boxes
 from rgbd_kcf_tracker.evaluation.metrics.comparison import Comparison, compare
+from rgbd_kcf_tracker.evaluation.metrics.means import mean_of
 
 PRECISION_PX = 20.0
 
@@ -100,20 +100,7 @@ def measure_boxes(predicted: Boxes, truth: Boxes, body: Boxes | None = None) -> 
 
 def mean(measures: Iterable[Measures]) -> Measures:
     """Mean over sequences, each counting once; a NaN does not count."""
-    rows = np.array([dataclasses.astuple(m) for m in measures], np.float64)
-    if not len(rows):
-        return Measures(*[math.nan] * len(NAMES))
-    with warnings.catch_warnings():
-        warnings.simplefilter('ignore', RuntimeWarning)  # a measure that no sequence has
-        return Measures(*[float(v) for v in np.nanmean(rows, axis=0)])
-
-
-def pooled_counts(comparisons: Sequence[Comparison]) -> confusion.Counts:
-    """Counts over the frames of all sequences, as the thesis's matrices are printed."""
-    total = confusion.Counts()
-    for c in comparisons:
-        total = total + confusion.count_overlaps(c.overlap, c.said, c.there)
-    return total
+    return mean_of(Measures, measures)
 
 
 def _mean(values: FloatArray | Mask) -> float:

@@ -92,7 +92,7 @@ class Crowd:
             forgotten = min(others, key=lambda p: (p.alive, p.seen_at))
             if forgotten.alive:
                 self._arrivals.forgotten += is_new(forgotten.again, self._arrivals.last)
-            self.people.remove(forgotten)
+            self.forget(forgotten)
         person = Person(self._next, place, time, chosen)
         self._next += 1
         self.people.append(person)
@@ -126,7 +126,7 @@ class Crowd:
                     return other
                 if not person.chosen and person in self.people:
                     # Nobody: he was made of two, and looks like both.
-                    self.people.remove(person)
+                    self.forget(person)
             elif account.time == person.seen_at or (
                 since < person.first_seen and not person.chosen
             ):
@@ -185,8 +185,10 @@ class Crowd:
         return person
 
     def forget(self, person: Person) -> None:
-        """He was nobody, or is known by another number."""
+        """He was nobody, or is known by another number: nobody remembers this one."""
         self.people.remove(person)
+        for other in self.people:
+            other.forget(person.number)
 
     def explain(self, scene: Scene, time: float) -> Account:
         """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
@@ -354,7 +356,7 @@ class Crowd:
                 account.people.index(person) if each == row else each for each in account.owner
             ]
             person.become(newcomer)
-            self.people.remove(newcomer)
+            self.forget(newcomer)
 
     def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
         """Remember who was seen beside whom: they are surely not the same."""
@@ -405,7 +407,7 @@ class Crowd:
         if double.number in person.met or double.chosen:
             return
         if double in self.people:
-            self.people.remove(double)
+            self.forget(double)
 
     def _see(
         self, account: Account, row: int, seen: Silhouette, index: int, sure: bool = True

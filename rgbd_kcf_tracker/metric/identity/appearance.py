@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -206,7 +207,7 @@ class Appearance:
         if dt is None:
             rate = color_rate = 1.0
         else:
-            rate = min(MAX_RATE, 1 - (1 - self._rate) ** (dt / FRAME))
+            rate = share_after(self._rate, dt)
             color_rate = min(MAX_RATE, COLOR_RATE * rate)
         self._colors.learn(read.codes, self._inner, self._near & ~self._outer, color_rate)
         self._filter.learn(read.spectrum, self._mask(read.codes), rate)
@@ -225,6 +226,11 @@ class Appearance:
         mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         result: npt.NDArray[np.float32] = np.maximum(mask, np.float32(0.3) * self._core)
         return result
+
+
+def share_after(rate: float, seconds: float) -> float:
+    """Share of a new sample after so many seconds, where it is ``rate`` for each :data:`FRAME`."""
+    return min(MAX_RATE, 1 - math.pow(1 - rate, seconds / FRAME))
 
 
 def _vertex(before: float, peak: float, after: float) -> float:

@@ -22,6 +22,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import Image
 from rgbd_kcf_tracker.features.optical_flow import Points, followed
 from rgbd_kcf_tracker.features.windows import resampled
+from rgbd_kcf_tracker.metric.identity.appearance import MIN_MASK
 
 Posterior = Callable[[Image], npt.NDArray[np.float32]]
 
@@ -51,9 +52,6 @@ own way."""
 LEAST_DISTANCE = 4.0
 """Pixels between two corners, along an axis, from which their distance tells of growth: nearer, the
 error of a corner is more than anybody grows from frame to frame."""
-LEAST_MASK = 0.2
-"""Share of the box that looks like the target from which other pixels are left out, as for the
-filter (:data:`~.appearance.MIN_MASK`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +97,7 @@ class TextureFlow:
         left, right = max(0, int(middle - reach * width)), int(middle + reach * width) + 1
         mask = np.zeros((SIDE, SIDE), np.uint8)
         mine = posterior(window[top:bottom, left:right]) > 0.5
-        mask[top:bottom, left:right] = 255 * (mine if mine.mean() > LEAST_MASK else 1)
+        mask[top:bottom, left:right] = 255 * (mine if mine.mean() > MIN_MASK else 1)
         self._last, self._mask = cv2.cvtColor(window, cv2.COLOR_BGR2GRAY), mask
         self._cx, self._cy, self._side = cx, cy, side
 

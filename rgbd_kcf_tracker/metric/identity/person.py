@@ -196,6 +196,11 @@ class Person:
         """Log-odds of looking like another, by all sightings of late; 0 where there are too few."""
         return self._resembles[other].odds(enough) if other in self._resembles else 0.0
 
+    def forget(self, other: int) -> None:
+        """Drop what is remembered of another, who is no more."""
+        self.met.discard(other)
+        self._resembles.pop(other, None)
+
     def seen_before(self, new: Mapping[int, float]) -> float:
         """Log-odds of being any of some who had gone, rather than somebody new, by looks alone.
 

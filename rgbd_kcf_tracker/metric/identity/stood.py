@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
@@ -64,9 +63,7 @@ class Stood:
             self.moves()  # or seems to
         elif motion is not None:
             self._place, self._carried = motion.of(self._place), True
-            turned, _ = cv2.Rodrigues(motion.rotation)
-            way = float(np.linalg.norm(turned)) + float(np.linalg.norm(motion.translation))
-            self._off += DRIFT * way
+            self._off += DRIFT * (motion.turn + motion.shift)
 
     def seen(self, place: FloatArray, sigma: FloatArray, dt: float) -> None:
         """Take where the target is, ``(3,)`` metres, each axis with its own deviation."""

@@ -299,5 +299,4 @@ def larger_than_anybody(sizes: Sizes) -> npt.NDArray[np.bool_]:
 
 def _stands(moved: Pose) -> bool:
     """Whether a camera's pose is that of a camera that stands still."""
-    turned = np.arccos(np.clip((np.trace(moved.rotation) - 1) / 2, -1.0, 1.0))
-    return float(turned) < STILL_TURN and float(np.linalg.norm(moved.translation)) < STILL
+    return moved.turn < STILL_TURN and moved.shift < STILL
