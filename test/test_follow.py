@@ -139,6 +139,9 @@ class Future:
         for callback in self._callbacks:
             callback(self)
 
+    def done(self) -> bool:
+        return self._done
+
     def result(self) -> Any:
         if isinstance(self._result, Exception):
             raise self._result
@@ -182,7 +185,7 @@ class Server:
 
     def __init__(self) -> None:
         self.ready = True
-        self.refuse = False
+        self.refuse = self.late = False
         self.goals: list[Any] = []
         self.cancelled = 0
         self.active: Handle | None = None
@@ -199,18 +202,26 @@ class Server:
         return self.ready
 
     def send_goal_async(self, goal: Any) -> Future:
-        from geometry_msgs.msg import PoseStamped
-
         assert goal.pose_topic or goal.tracked_frame, 'the server would end at once'
         assert goal.max_duration.sec >= 0
         self.goals.append(goal)
         answer, handle = Future(), Handle(self, not self.refuse)
+        if self.late:
+            self.node.create_timer(0.2, lambda: self.accept(goal, handle, answer))
+        else:
+            self.accept(goal, handle, answer)
+        return answer
+
+    def accept(self, goal: Any, handle: Handle, answer: Future) -> None:
+        from geometry_msgs.msg import PoseStamped
+
+        if answer.done():
+            return
         if handle.accepted:
             assert self.active is None, 'two goals at once'
             self.active, self.topic = handle, goal.pose_topic
             self.node.create_subscription(PoseStamped, goal.pose_topic, self.poses.append, 1)
         answer.set_result(handle)
-        return answer
 
     def end(self, handle: Handle, code: int, text: str) -> None:
         if self.active is handle:
@@ -355,6 +366,18 @@ def test_a_server_that_is_not_there_or_refuses_and_a_node_that_ends() -> None:
         node.following.asked = True
         tracker.until(lambda: server.active is not None, seen=True)
     assert server.active is None, 'a node that ends leaves the robot driving'
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(120)
+def test_a_goal_that_is_accepted_while_the_node_ends_is_taken_back() -> None:
+    server = Server()
+    server.late = True
+    with running(server) as (_, camera):
+        tracker = FakeTracker(camera)
+        tracker.until(lambda: bool(server.goals), seen=True)
+    assert server.cancelled == 1
+    assert server.active is None
 
 
 def test_without_the_action_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,7 +42,7 @@ class FollowParameters(Parameters):
     )
     retry_after: float = parameter(
         2.0,
-        'Time after the action has ended, for whatever reason, before it is asked for again.',
+        'Time after the action was refused or has ended by itself before it is asked for again.',
         unit='s',
         minimum=0.1,
         maximum=600.0,

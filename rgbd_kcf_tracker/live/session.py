@@ -153,10 +153,12 @@ class Session:
         """Whether a target was asked for, and its turn has come."""
         if self._choice is None and not self._additions:
             return False
-        now = self._now()
-        saved = self._credit_s + (now - self._credited) * REQUESTS_SHARE
-        self._credit_s, self._credited = min(saved, REQUESTS_CREDIT_S), now
-        return self._credit_s > 0
+        return self._credit() > 0
+
+    def _credit(self) -> float:
+        """Seconds that requests may take now."""
+        saved = self._credit_s + (self._now() - self._credited) * REQUESTS_SHARE
+        return min(saved, REQUESTS_CREDIT_S)
 
     # -- what is asked ----------------------------------------------------------------------------
 
@@ -260,7 +262,7 @@ class Session:
         for _ in range(len(self._additions)):
             with self.charged():
                 self._added_as_asked(frame, self._additions.popleft())
-            if self._credit_s <= 0:
+            if self._credit() <= 0:
                 break
         return started
 
@@ -268,6 +270,7 @@ class Session:
     def charged(self) -> Iterator[None]:
         """Count what is done within as time that went into requests."""
         begun = self._now()
+        self._credit_s, self._credited = self._credit(), begun
         try:
             yield
         finally:

@@ -14,6 +14,7 @@ from builtin_interfaces.msg import Duration
 from geometry_msgs.msg import PolygonStamped
 from rclpy.action import ActionClient
 from rclpy.clock import Clock, ClockType
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
@@ -27,6 +28,8 @@ from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
 PERIOD_S = 0.1
 SAY_AGAIN_S = 10.0
+ANSWER_S = 0.5
+"""Seconds for which a node that ends waits to be told whether its goal was accepted."""
 HOMES = ('nav2_msgs.action', 'opennav_following_msgs.action')
 """Packages that have had the action FollowObject, the newer first."""
 
@@ -81,7 +84,7 @@ class FollowNode(Node):
         self._type = action_type() if action is None else action
         self._client = client(self, self._type, self.settings.action)
         self._goal: Any = None
-        self._asking = False
+        self._asking: Any = None
         self._said: tuple[str, float] = '', 0.0
         self._hidden = False
         light = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -95,7 +98,7 @@ class FollowNode(Node):
     @property
     def active(self) -> bool:
         """Whether the action server follows for us, or was asked to."""
-        return self._asking or self._goal is not None
+        return self._asking is not None or self._goal is not None
 
     # -- what comes -------------------------------------------------------------------------------
 
@@ -136,11 +139,11 @@ class FollowNode(Node):
         goal.pose_topic = self.pose_topic
         seconds = self.settings.max_duration
         goal.max_duration = Duration(sec=int(seconds), nanosec=int(seconds % 1 * 1e9))
-        self._asking = True
-        self._client.send_goal_async(goal).add_done_callback(self._answered)
+        self._asking = self._client.send_goal_async(goal)
+        self._asking.add_done_callback(self._answered)
 
     def _answered(self, future: Any) -> None:
-        self._asking = False
+        self._asking = None
         try:
             goal = future.result()
         except Exception as error:  # rclpy has no common class for what a server can do
@@ -185,6 +188,14 @@ class FollowNode(Node):
 
     def destroy_node(self) -> None:
         """Have the robot stop before the node goes."""
+        if self._asking is not None:  # who accepts later would follow with nobody to stop it
+            self.following.asked = False
+            executor = SingleThreadedExecutor(context=self.context)
+            executor.add_node(self)
+            end = time.monotonic() + ANSWER_S
+            while self._asking is not None and time.monotonic() < end:
+                executor.spin_once(timeout_sec=0.05)
+            executor.shutdown(timeout_sec=0.0)
         if self._goal is not None:
             self._cancel('the follow node ends')
         super().destroy_node()
