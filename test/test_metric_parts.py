@@ -447,7 +447,7 @@ def placed(cut_bottom: bool) -> tuple[Body, np.ndarray]:
 def test_body_is_placed_by_the_sides_that_show():
     body, whole = placed(cut_bottom=False)
     assert body.height == pytest.approx(0.8)
-    assert whole == pytest.approx([-0.05, -0.4, 2.0, 1.0], abs=1e-6)
+    assert whole == pytest.approx([-0.055, -0.405, 2.0, 1.0], abs=1e-6)
     _, half = placed(cut_bottom=True)
     assert half[:3] == pytest.approx(whole[:3], abs=1e-6)
     assert half[3] == pytest.approx(0.5)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from people_rig import BLUE, CAMERA, COLS, ROWS, TOP, WALL, Someone, images, picture, texture
 
-from rgbd_kcf_tracker import Box, Frame
+from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, stands, upper_median
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
@@ -683,6 +683,15 @@ def test_a_box_has_the_pixels_that_it_touches(
     box: Box, rows: tuple[int, int], cols: tuple[int, int]
 ):
     assert part_in((40, 60, 3), box) == (slice(*rows), slice(*cols))
+
+
+def test_places_of_a_view_are_counted_from_its_edges_and_metres_from_the_middles_of_pixels():
+    view = DepthView(np.ones((40, 60), np.float32), 1, Intrinsics(100, 100, 29.5, 19.5))
+    assert view.metres(30, 20, 2.0) == (0.0, 0.0, 2.0), 'the middle of all of it'
+    left, top, depth = view.metres(10, 5, 2.0)
+    assert view.place(left, top, depth) == pytest.approx((10, 5))
+    whole = Silhouette.of(view, 0, 0, np.ones((40, 60), bool), 0, Rim())
+    assert whole.metres == pytest.approx((-0.3, -0.2, 0.3, 0.2))
 
 
 def test_a_camera_that_moves_learns_from_every_frame():

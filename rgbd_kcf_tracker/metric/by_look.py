@@ -500,7 +500,7 @@ def _step_of(frame: Frame) -> int:
 
 
 def _averaged(frame: Frame) -> Image:
-    """A frame's colours as small as :func:`_small`'s, each the mean of what it stands for."""
+    """A frame's colours, about as small as :func:`_small` has them, each the mean of its place."""
     step = _step_of(frame)
     cols, rows = max(1, frame.width // step), max(1, frame.height // step)
     whole = frame.color[: rows * step, : cols * step]

@@ -316,7 +316,7 @@ class BySurface:
     def _at(self, view: DepthView, box: Box) -> tuple[FloatArray, FloatArray]:
         """Where the target would be in a box of the image, and how surely, ``(3,)`` metres each."""
         z = float(self.motion.position[2])
-        place = view.intrinsics.deproject(box.cx / view.step, box.y / view.step, z)
+        place = view.metres(box.cx / view.step, box.y / view.step, z)
         return np.array(place), np.array([0.1, 0.1, 10.0])
 
     # -- parts ------------------------------------------------------------------------------------

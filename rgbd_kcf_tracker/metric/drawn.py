@@ -91,8 +91,8 @@ class Drawn:
             return None
         gallery = Gallery()
         gallery.learn(seen, time)
-        k, b = scene.view.intrinsics, box.over(scene.view.step)
-        middle = k.deproject(b.cx, b.cy, STATURE * k.fy / b.height)
+        view, b = scene.view, box.over(scene.view.step)
+        middle = view.metres(b.cx, b.cy, STATURE * view.intrinsics.fy / b.height)
         return cls(gallery, scene.axes @ np.array(middle), not scene.ends(box).any)
 
     def unlike(self, view: View) -> bool:

@@ -241,43 +241,15 @@ class Follower:
         found = surface.step(account, frame, dt)
         if surface.was_away:
             self._withdraw()
-        if found is not None and surface.was_away and self.person is not None:
-            index = account.sight_of(found.seen)
-            stranger = account.stranger(self.person, index)
-            # A part of somebody, where all of the target is a figure, tells not for good who it is;
-            # but a thing that was in view until the camera paused is hardly another one.
-            part = self.person.figure and surface.hidden_for > 0
-            new = account.owner[index] < 0 if index >= 0 else part
-            against = account.against * away(account.time - self.person.seen_at)
-            if new or (stranger is not None and not self._recognised(stranger, account.time)):
-                box = surface.box(account.scene, found)
-                belief = surface.glimpse(account.scene, found)
-                others = math.exp(against) + account.as_others(self.person, index)
-                score = bounded(found.probability, math.log(others))
-                self.glimpsed = found.seen if score >= EVEN else None
-                self._doubt(SOMEBODY_NEW, found, score)
-                surface.miss(account.scene, dt)
-                if score < EVEN:  # a box on a stranger is worse than none
-                    return self._hidden(frame, dt)
-                return self._tracked(frame, box, score, found.seen.depth, belief)
-            if self.person.figure and self.person.gallery.views:
-                self._comeback = Comeback(self.person, account.time, against)
-            surface.resume(found)
-        score = 0.0 if found is None else found.probability
-        if found is not None and self._comeback is None and self._seen_again(surface, dt):
-            assert self.person is not None
-            # His chances are those of this frame, and only his looks change them from here on.
-            against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
-            self._comeback = Comeback(self.person, account.time, against, place=True)
-            self._likely(self._comeback, account, found)
-        elif self._comeback is not None:
-            likely = self._likely(self._comeback, account, found)
-            if found is not None:
-                score *= likely.score
-                self._doubt(KNOWN_BEFORE, found, score)
-            if self._comeback.denied:
-                self._disown(self._comeback, account.time)
-                return self._hidden(frame, dt)
+            if found is not None and self.person is not None:
+                unsure = self._returned(frame, account, dt, surface, found, self.person)
+                if unsure is not None:
+                    return unsure
+        comeback = self._comeback
+        score = self._score(account, dt, surface, found)
+        if comeback is not None and comeback.denied:
+            self._disown(comeback, account.time)
+            return self._hidden(frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
         whole = self._whole(account, found.seen)
@@ -295,6 +267,57 @@ class Follower:
         if self._look is not None and not found.seen.cut.any and score >= LEARNED:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, score, found.seen.depth, surface.belief())
+
+    def _returned(
+        self,
+        frame: Frame,
+        account: Account,
+        dt: float,
+        surface: BySurface,
+        found: Candidate,
+        person: Person,
+    ) -> Track | None:
+        """The track of what may be the target that was away; None where it is taken to be it."""
+        index = account.sight_of(found.seen)
+        stranger = account.stranger(person, index)
+        # A part of somebody, where all of the target is a figure, tells not for good who it is;
+        # but a thing that was in view until the camera paused is hardly another one.
+        part = person.figure and surface.hidden_for > 0
+        new = account.owner[index] < 0 if index >= 0 else part
+        against = account.against * away(account.time - person.seen_at)
+        if new or (stranger is not None and not self._recognised(stranger, account.time)):
+            box = surface.box(account.scene, found)
+            belief = surface.glimpse(account.scene, found)
+            others = math.exp(against) + account.as_others(person, index)
+            score = bounded(found.probability, math.log(others))
+            self.glimpsed = found.seen if score >= EVEN else None
+            self._doubt(SOMEBODY_NEW, found, score)
+            surface.miss(account.scene, dt)
+            if score < EVEN:  # a box on a stranger is worse than none
+                return self._hidden(frame, dt)
+            return self._tracked(frame, box, score, found.seen.depth, belief)
+        if person.figure and person.gallery.views:
+            self._comeback = Comeback(person, account.time, against)
+        surface.resume(found)
+        return None
+
+    def _score(
+        self, account: Account, dt: float, surface: BySurface, found: Candidate | None
+    ) -> float:
+        """How surely what was found is the target, after a return beside what it was known by."""
+        score = 0.0 if found is None else found.probability
+        if found is not None and self._comeback is None and self._seen_again(surface, dt):
+            assert self.person is not None
+            # His chances are those of this frame, and only his looks change them from here on.
+            against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
+            self._comeback = Comeback(self.person, account.time, against, place=True)
+            self._likely(self._comeback, account, found)
+        elif self._comeback is not None:
+            likely = self._likely(self._comeback, account, found)
+            if found is not None:
+                score *= likely.score
+                self._doubt(KNOWN_BEFORE, found, score)
+        return score
 
     def _doubt(self, cue: str, found: Candidate, score: float) -> None:
         self.doubts[cue] = logit(score) - logit(found.probability)

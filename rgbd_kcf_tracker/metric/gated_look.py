@@ -284,7 +284,7 @@ def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] 
             return None
         low, depth, high = np.percentile(read, (16, 50, 84)).tolist()
         spread = (high - low) / 2
-    place = np.array(view.intrinsics.deproject(box.cx / view.step, box.cy / view.step, depth))
+    place = np.array(view.metres(box.cx / view.step, box.cy / view.step, depth))
     width = box.width / view.step * depth / view.intrinsics.fx
     aside = np.abs(place) / depth * spread
     return place, np.hypot(LOOK_OFF + LOOK_OFF_SHARE * width, aside), width

@@ -31,15 +31,9 @@ class ExpectedBody:
 
     def sides(self, view: DepthView) -> tuple[float, float, float, float]:
         """Left, top, right, bottom in pixels of the view."""
-        k = view.intrinsics
         x, y, z = self.position.tolist()
         half = self.width / 2
-        return (
-            (x - half) * k.fx / z + k.cx,
-            y * k.fy / z + k.cy,
-            (x + half) * k.fx / z + k.cx,
-            (y + self.height) * k.fy / z + k.cy,
-        )
+        return (*view.place(x - half, y, z), *view.place(x + half, y + self.height, z))
 
     def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
         """Depth where it is expected, and the pixels it would have if none were outside."""

@@ -105,10 +105,8 @@ def _split(
     beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
     above = min(2 * expected.sigma[1] + 0.15, 0.5)
     part = view.part(
-        (x - beside) * k.fx / z + k.cx,
-        (y - above) * k.fy / z + k.cy,
-        (x + beside) * k.fx / z + k.cx,
-        (y + body.height + above) * k.fy / z + k.cy,
+        *view.place(x - beside, y - above, z),
+        *view.place(x + beside, y + body.height + above, z),
     )
     depth = view.depth[part]
     if min(depth.shape) < 3:
@@ -154,7 +152,7 @@ def _narrowed(
     odds -= np.float32(0.5) * others.within(seen.rows, seen.cols)
     profile = np.convolve(odds.sum(axis=0), np.ones(cols), 'valid')
     middle = seen.left + np.arange(len(profile)) + cols / 2
-    x = (middle - k.cx) * seen.depth / k.fx
+    x = (middle - 0.5 - k.cx) * seen.depth / k.fx
     pixels = max(20.0, np.count_nonzero(seen.mask) / seen.mask.shape[1] * cols)
     spread = expected.sigma[0] ** 2 + 0.1**2
     score = 6 * profile / pixels - 0.5 * np.square(x - expected.position[0]) / spread
@@ -172,18 +170,16 @@ def gathered(
         None where there is nothing to add.
     """
     view, surfaces = scene.view, scene.surfaces
-    k = view.intrinsics
     rows, cols = seen.mask.shape
-    scale = k.fx / seen.depth
     half = 0.6 * max(body.width, seen.width)
-    left = min((placed.position[0] - half) * scale + k.cx, seen.left)
-    right = max((placed.position[0] + half) * scale + k.cx, seen.left + cols)
+    x, y, _ = placed.position.tolist()
+    height = max(body.height, seen.height)
+    left, top = view.place(x - half, y - 0.15 * height, seen.depth)
+    right, bottom = view.place(x + half, y + 1.05 * height, seen.depth)
+    left, right = min(left, seen.left), max(right, seen.left + cols)
     if seen.label == 0:
         # A part cut out of something larger is not to be joined with the rest of that again.
         left, right = max(left, seen.left - 1), min(right, seen.left + cols + 1)
-    height = max(body.height, seen.height)
-    top = (placed.position[1] - 0.15 * height) * k.fy / seen.depth + k.cy
-    bottom = (placed.position[1] + 1.05 * height) * k.fy / seen.depth + k.cy
     boxes = surfaces.boxes
     inside = (boxes[:, 0] >= left) & (boxes[:, 0] + boxes[:, 2] <= right)
     inside &= (boxes[:, 1] >= top) & (boxes[:, 1] + boxes[:, 3] <= bottom)

@@ -221,6 +221,7 @@ class Person:
             self.place, self.velocity = newcomer.place, newcomer.velocity
             self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
             self.hidden, self.came = newcomer.hidden, newcomer.came
+            self.figure, self.calm = newcomer.figure, newcomer.calm
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright

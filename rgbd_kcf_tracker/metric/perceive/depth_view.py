@@ -66,12 +66,28 @@ class DepthView:
         )
 
     def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
-        """Rows and columns from one pixel's to another's, as far as they are in the view."""
+        """Rows and columns of what lies between these places, as far as they are in the view."""
         rows, cols = self.shape
         return (
             slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
             slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
         )
+
+    def metres(self, across: float, down: float, depth: float) -> tuple[float, float, float]:
+        """Where a place of the view is, in metres of the camera's frame.
+
+        Args:
+            across: columns from the view's left edge: a box counts pixels by their edges, a camera
+                by their middles.
+            down: rows from its upper edge.
+            depth: metres.
+        """
+        return self.intrinsics.deproject(across - 0.5, down - 0.5, depth)
+
+    def place(self, x: float, y: float, depth: float) -> tuple[float, float]:
+        """Columns from the view's left edge, and rows from its upper one, of a place in metres."""
+        k = self.intrinsics
+        return x * k.fx / depth + k.cx + 0.5, y * k.fy / depth + k.cy + 0.5
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -74,8 +74,8 @@ def parted(
     far = _farther(mask, ahead, z / k.fy)
     if narrow and len(expected) < 2 and far is None:
         return [(left, top, mask)]
-    columns = np.arange(left, left + cols) + 0.5 - k.cx
-    lines = np.arange(top, top + rows) + 0.5 - k.cy
+    columns = np.arange(left, left + cols) - k.cx
+    lines = np.arange(top, top + rows) - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.
     x_of, y_of = right[0] / k.fx, right[1] / k.fy
     seeds = expected

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -23,7 +24,7 @@ from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, upright_people
+from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, UprightPeople, upright_people
 from rgbd_kcf_tracker.pose import Pose
 
 STILL, STILL_TURN = 0.003, 0.001
@@ -151,23 +152,15 @@ class SceneReader:
             return None
         # To what depth shows the frames without it are a pause.
         seconds, self._unread = self._unread, 0.0
-        self._learned += seconds
-        self._taught += seconds
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
             self._floors = FloorFinder()
-        moves = self.stood_for == 0.0
-        fast = not moves and 0 < seconds < LEARNING_STEP / 2
-        learns = not fast or self._learned >= LEARNING_STEP
-        # Where frames come fast, looks are learned from another one than the room: none takes long.
-        teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
+        learns, since = self._due(seconds)
         image = view_image(frame.color, view.step, view.shape)
-        motion = self._move(image, view, frame.pose, seconds)
-        way = motion
-        if isinstance(motion, Lost) and self.room.agrees(view.depth):
-            way = motion if motion.surely else None
-            motion = None
+        motion = way = self._move(image, view, frame.pose, seconds)
+        if isinstance(way, Lost) and self.room.agrees(view.depth):
+            motion, way = None, way if way.surely else None
         floor = (
             self._floors.update(view, seconds, learns, motion) if self._floor_margin > 0 else None
         )
@@ -182,56 +175,81 @@ class SceneReader:
             self._rim = Rim.of(view)
         elif learns:
             self._rim = Rim.of(view).common(self._rim)
+        rim = self._rim
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
-        fresh = self.room.depth.shape != view.shape or isinstance(motion, Lost)
-        if fresh:
-            people = upright_people(view, surfaces, elevation, forward, axes[0], self._rim)
-            self.room.restart(view.depth, people.mask)
-            self._light.restart()
-        else:
-            somebody, undecided = self.somebody, None
-            if isinstance(motion, Pose):
-                unknown = self.room.moved(motion, view.intrinsics)
-                people = upright_people(
-                    view, surfaces, elevation, forward, axes[0], self._rim, whole=True
-                )
-                large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
-                going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
-                opened = (people.mask | going_on.somebody) & unknown
-                opened |= self.room.passing(people.tall, view.depth, surfaces)
-                self.room.open(opened, view.depth)
-                # Whose other side comes into view next may be somebody or something, and so may
-                # be what somebody touches.
-                undecided = _at_side(view, surfaces, self._rim, large) | going_on.beyond
-                self._light.restart()
-                somebody = None
-            self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided)
+
+        def upright(whole: bool) -> UprightPeople:
+            return upright_people(view, surfaces, elevation, forward, axes[0], rim, whole=whole)
+
+        self._see_room(view, surfaces, rim, upright, motion, seconds, learns)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
+        return Scene(
+            view=view,
+            floor=floor,
+            elevation=elevation,
+            forward=forward,
+            axes=axes,
+            standing=mask,
+            before=before,
+            still=self.room.still,
+            vacant=self.room.vacant,
+            surfaces=surfaces,
+            rim=rim,
+            image=image,
+            codes=ColorCodes(image),
+            motion=motion,
+            way=way,
+            stood_for=self.stood_for,
+            since=since,
+        )
+
+    def _due(self, seconds: float) -> tuple[bool, float | None]:
+        """Whether the room is learned from this frame, and :attr:`Scene.since`."""
+        self._learned += seconds
+        self._taught += seconds
+        moves = self.stood_for == 0.0
+        fast = not moves and 0 < seconds < LEARNING_STEP / 2
+        learns = not fast or self._learned >= LEARNING_STEP
+        # Where frames come fast, looks are learned from another one than the room: none takes long.
+        teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
         since = self._taught if teaches else None
         if learns:
             self._learned = 0.0
         if teaches:
             self._taught = 0.0
-        return Scene(
-            view,
-            floor,
-            elevation,
-            forward,
-            axes,
-            mask,
-            before,
-            self.room.still,
-            self.room.vacant,
-            surfaces,
-            self._rim,
-            image,
-            ColorCodes(image),
-            motion,
-            way,
-            self.stood_for,
-            since,
-        )
+        return learns, since
+
+    def _see_room(
+        self,
+        view: DepthView,
+        surfaces: Surfaces,
+        rim: Rim,
+        upright: Callable[[bool], UprightPeople],
+        motion: Pose | Lost | None,
+        seconds: float,
+        learns: bool,
+    ) -> None:
+        """Show the room a view; ``upright`` tells who in it is a person by his shape alone."""
+        if self.room.depth.shape != view.shape or isinstance(motion, Lost):
+            self.room.restart(view.depth, upright(False).mask)
+            self._light.restart()
+            return
+        somebody, undecided = self.somebody, None
+        if isinstance(motion, Pose):
+            unknown = self.room.moved(motion, view.intrinsics)
+            people = upright(True)
+            large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
+            going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
+            opened = (people.mask | going_on.somebody) & unknown
+            opened |= self.room.passing(people.tall, view.depth, surfaces)
+            self.room.open(opened, view.depth)
+            # Whose other side comes into view next may be somebody or something, and so may
+            # be what somebody touches.
+            undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
+            self._light.restart()
+            somebody = None
+        self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided)
 
     def settle(self) -> None:
         """Do what an answer need not wait for."""

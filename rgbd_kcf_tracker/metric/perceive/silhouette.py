@@ -217,14 +217,10 @@ class Silhouette:
             hidden.right or ends.right,
             hidden.bottom or ends.bottom,
         )
-        metres = (
-            (left - k.cx) * z / k.fx,
-            (top - k.cy) * z / k.fy,
-            (left + cols - k.cx) * z / k.fx,
-            (top + rows - k.cy) * z / k.fy,
-        )
+        x0, y0, _ = view.metres(left, top, z)
+        x1, y1, _ = view.metres(left + cols, top + rows, z)
         area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
-        return cls(left, top, mask, label, z, area, cut, metres)
+        return cls(left, top, mask, label, z, area, cut, (x0, y0, x1, y1))
 
     @classmethod
     def trimmed(

@@ -90,8 +90,8 @@ class Sizes:
         boxes = surfaces.boxes
         return cls(
             surfaces.areas(k),
-            (boxes[:, 0] + boxes[:, 2] / 2 - k.cx) * z / k.fx,
-            (boxes[:, 1] + boxes[:, 3] / 2 - k.cy) * z / k.fy,
+            (boxes[:, 0] + (boxes[:, 2] - 1) / 2 - k.cx) * z / k.fx,
+            (boxes[:, 1] + (boxes[:, 3] - 1) / 2 - k.cy) * z / k.fy,
             boxes[:, 2] * z / k.fx,
             boxes[:, 3] * z / k.fy,
         )
