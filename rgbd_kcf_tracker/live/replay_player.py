@@ -18,9 +18,9 @@ from rgbd_kcf_tracker.live.stopping import Stopping
 
 ATTEMPTS = 3
 """How often images are sent in lock-step before their answer is given up."""
-
-
 FIRST_PERIOD_S = 0.2
+"""After which images are sent again until the first answer: discovery takes some tenths of a
+second."""
 RECENT = 8
 """Images that are kept for sending again."""
 

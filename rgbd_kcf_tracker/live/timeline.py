@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 LARGEST_STEP_NS = 60 * NANOSECONDS
 """A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
 LEAST_STEP_NS = 1_000_000
+"""Time goes on by this much at the least where a stamp does not."""
 
 
 @dataclass(frozen=True, slots=True)

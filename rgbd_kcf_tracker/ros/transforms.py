@@ -26,6 +26,7 @@ from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 
 ASK_AGAIN_S = 0.002
+"""Between two looks at the buffer while a transform is waited for, which is mostly soon there."""
 CARRIED_SHIFT, CARRIED_TURN = 0.002, 0.005
 """Metres and radians within which a camera stands still in a frame that moves with it."""
 MOVED = 0.02

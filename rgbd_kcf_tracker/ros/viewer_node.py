@@ -55,8 +55,8 @@ from rgbd_kcf_tracker.view.live_page import (
 
 LIGHT = QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
 """Of answers in words: a page that is late shows the newest."""
-POLL_S = 0.05
-SETTINGS_S = 2.0
+POLL_S, SETTINGS_S = 0.05, 2.0
+"""Between two looks at what the browsers ask, and at the tracker's settings."""
 LINGER_S = 3.0
 """Seconds after the last browser has gone in which the images are still listened to."""
 PAIR_NS = round(DEFAULT_TOLERANCE_S * 1e9)

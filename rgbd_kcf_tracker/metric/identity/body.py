@@ -165,9 +165,8 @@ class Body:
 
     def _rows(self, seen: Silhouette, view: DepthView, top: float) -> tuple[float, float]:
         """First row of the body within the silhouette's crop, and its number of rows."""
-        k = view.intrinsics
-        row = top * k.fy / seen.depth + k.cy - seen.top
-        return row, self.height * k.fy / seen.depth
+        _, row = view.place(0.0, top, seen.depth)
+        return row - seen.top, self.height * view.intrinsics.fy / seen.depth
 
     def _histograms(
         self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float

@@ -57,6 +57,9 @@ one. Kept for good, a worktop was the floor of a kitchen (`redkitchen`), and thi
 """
 BEST = 5
 """Planes that are fitted again, the best first, until one passes."""
+SEARCH_AGAIN = 0.2
+"""Seconds after which a floor is looked for again where none was found, as a hundred planes are
+tried: in less time a camera has seen little new."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +163,7 @@ class FloorFinder:
 
     def __init__(self) -> None:
         self._floor: Floor | None = None
-        self._wait = 0
+        self._wait = 0.0
         self._hidden = 0.0
 
     def update(
@@ -216,13 +219,13 @@ class FloorFinder:
                     self._floor = known
             if self._floor is not None:
                 return self._floor
+        self._wait -= seconds
         if self._wait > 0:
-            self._wait -= 1
             return None
         self._floor = self._searched(view, u, v, rays)
         self._hidden = 0.0
         if self._floor is None:
-            self._wait = 5
+            self._wait = SEARCH_AGAIN
         return self._floor
 
     def _searched(
@@ -285,5 +288,5 @@ def _inverse(view: DepthView, first: int, end: int) -> npt.NDArray[np.float32]:
 
 
 def _noise(z: FloatArray) -> FloatArray:
-    """Metres by which readings of the floor lie beside it, ``(n,)``."""
+    """Metres by which readings of the floor lie beside it, ``(n,)``: of a Kinect, seen flat."""
     return 0.02 + 0.012 * z
