@@ -281,6 +281,15 @@ def test_other_content_has_another_digest(recorded: Path, change: str):
     assert files_digest([recorded]) != before
 
 
+def test_what_a_linked_folder_holds_is_part_of_the_digest(recorded: Path, tmp_path: Path):
+    (recorded / 'rgb').rename(tmp_path / 'elsewhere')
+    (recorded / 'rgb').symlink_to(tmp_path / 'elsewhere')
+    (tmp_path / 'elsewhere' / 'circle').symlink_to(recorded)
+    before = files_digest([recorded])
+    (tmp_path / 'elsewhere' / '0.png').write_bytes(bytes([7]) * 999)
+    assert files_digest([recorded]) != before
+
+
 def test_digests_are_kept_until_a_file_changes(recorded: Path, monkeypatch: pytest.MonkeyPatch):
     from rgbd_kcf_tracker.batch import content
 

@@ -167,6 +167,13 @@ def test_parts_of_different_runs_are_not_joined(tmp_path: Path, capsys):
     parts = [str(tmp_path / '1'), str(tmp_path / '2')]
     assert main(['evaluate', '--merge', *parts, '--report', str(tmp_path / 'r')]) == 2
     assert 'parts of different runs: their contenders differ' in capsys.readouterr().err
+    same = ['--jobs', '1', '--shard', '1/2', '--report', str(tmp_path / 'again')]
+    assert main(['evaluate', *SCENES[:-1], 'kcf', *same]) == 0
+    (part,) = (tmp_path / 'again').glob('**/1_of_2.json')
+    part.write_text(part.read_text().replace('"part": 1', '"more": 0, "part": 1'))
+    twice = [str(tmp_path / '1'), str(tmp_path / 'again')]
+    assert main(['evaluate', '--merge', *twice, '--report', str(tmp_path / 'r')]) == 2
+    assert 'are the same part with other results' in capsys.readouterr().err
     assert main(['evaluate', '--merge', str(tmp_path), '--report', str(tmp_path / 'r')]) == 2
     assert 'holds no part' in capsys.readouterr().err
     (tmp_path / 'circle').symlink_to('circle')

@@ -228,6 +228,7 @@ def test_scores_on_real_and_simulated_data_apart():
     assert len(plots.honesty_plot(found)) > 1000
     curves = [np.array([0.34, 1.0, np.nan]), np.array([0.999, 1.0])]
     assert [plots.least_shown(curves[i:]) for i in (0, 1)] == [0.3, 0.9]
+    assert plots.least_shown([np.full(3, np.nan)]) == 0.9, 'scores below 0, as of other trackers'
     assert len(plots.reliability_plot(found)) > 1000
 
 
@@ -249,6 +250,10 @@ def test_tables_as_csv_text_and_markdown():
     assert table.markdown().splitlines()[1] == '| --- | ---: |'
     two = Table('k', 't', ('tracker', 'a'), (('x', 1.0), ('y', 2.0), ('thesis', 9.0)), best='max')
     assert [two.is_best(row, 1) for row in two.rows] == [False, True, False]
+    nothing = Table('k', 't', ('tracker', 'a'), (('x', math.nan), ('y', 2.0)), best='max')
+    assert nothing.csv() == 'tracker,a\nx,\ny,2\n'
+    assert nothing.cells()[1] == ['x', '-']
+    assert not any(nothing.is_best(row, 1) for row in nothing.rows), 'one alone is not the best'
 
 
 def truth_of(boxes: list[tuple[float, ...]], fraction: float = 1.0, hz: float = 10.0) -> Truth:

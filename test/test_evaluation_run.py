@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.evaluation import boxfiles, contenders, runner
 from rgbd_kcf_tracker.evaluation.contenders import Contender, OpenCvTracker
 from rgbd_kcf_tracker.evaluation.datasets import Opened, Sample, Sequence
+from rgbd_kcf_tracker.evaluation.datasets.base import numbered
 from rgbd_kcf_tracker.evaluation.export import export
 from rgbd_kcf_tracker.evaluation.jobs import (
     RunOptions,
@@ -32,7 +33,7 @@ from rgbd_kcf_tracker.evaluation.jobs import (
 from rgbd_kcf_tracker.evaluation.metrics import vot
 from rgbd_kcf_tracker.evaluation.passes import OnePass, Thumbnails, WithRestarts, read_thumbnails
 from rgbd_kcf_tracker.evaluation.perframe import collect
-from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, write_tracks
+from rgbd_kcf_tracker.evaluation.store import read_tracks, slug, was_made_as, write_tracks
 from rgbd_kcf_tracker.evaluation.submissions import write_princeton, write_vot
 from rgbd_kcf_tracker.evaluation.times import read_times, times_path, times_table
 from rgbd_kcf_tracker.frame import Frame
@@ -260,13 +261,15 @@ def named(kind: str = 'folder', origin: int = 0) -> Sequence:
 
 
 def boxes_of(path: Path, seq: Sequence, frames: int, **place) -> list[Box | None]:
-    return [t.box for t in boxfiles.read(path, seq, opened(frames, **place), frames)]
+    start = place.get('start', 0)
+    numbers = range(start, start + frames)
+    return [t.box for t in boxfiles.read(path, seq, opened(frames, **place), numbers)]
 
 
 def test_plain_boxes_with_scores_and_absences(tmp_path: Path):
     path = tmp_path / 'boxes.txt'
     path.write_text('1,2,3,4,0.9\nnan,nan,nan,nan,nan\n0 0 0 0\n5\t6\t7\t8\n')
-    tracks = boxfiles.read(path, named(), opened(4), 4)
+    tracks = boxfiles.read(path, named(), opened(4), range(4))
     assert [t.box for t in tracks] == [Box(1, 2, 3, 4), None, None, Box(5, 6, 7, 8)]
     assert tracks[0].score == 0.9
 
@@ -290,12 +293,12 @@ def test_boxes_of_vot_results_have_codes_and_scores_beside(tmp_path: Path):
     path.write_text('1\n5,6,7,8\n0\n')
     (folder / 'room_ann_001_confidence.value').write_text('\n0.25\n0\n')
     assert boxfiles.find_file(str(tmp_path), named()) == path
-    tracks = boxfiles.read(path, named('vot'), opened(3), 3)
+    tracks = boxfiles.read(path, named('vot'), opened(3), range(3))
     assert [t.box for t in tracks] == [None, Box(5, 6, 7, 8), None]
     assert tracks[1].score == 0.25
     (folder / 'room_ann_001_confidence.value').write_text('1\n')
     with pytest.raises(DatasetError, match=r'confidence.value, line 2: 1 scores for the 3 lines'):
-        boxfiles.read(path, named('vot'), opened(3), 3)
+        boxfiles.read(path, named('vot'), opened(3), range(3))
 
 
 def test_our_own_csv_is_read_back(tmp_path: Path):
@@ -315,12 +318,42 @@ def test_boxes_of_the_whole_recording_are_cut_to_the_frames_measured(tmp_path: P
     assert boxes_of(path, named(), 3, start=4, total=10) == [Box(i, 0, 5, 5) for i in (4, 5, 6)]
 
 
+def test_boxes_of_the_whole_recording_are_those_of_the_frames_measured_at_a_rate(tmp_path: Path):
+    path = tmp_path / 'boxes.txt'
+    path.write_text(''.join(f'{i},0,5,5\n' for i in range(10)))
+    tracks = boxfiles.read(path, named(), opened(10), (0, 3, 6, 9))
+    assert [t.box for t in tracks] == [Box(i, 0, 5, 5) for i in (0, 3, 6, 9)]
+
+
+def test_samples_have_the_numbers_of_their_frames():
+    samples = list(moving_samples(4, 1))
+    assert [s.number for s in numbered(Opened(samples, 4, 7))] == [7, 8, 9, 10]
+
+
+def test_what_lies_beside_a_result_and_is_damaged_vouches_for_nothing(tmp_path: Path):
+    path = tmp_path / 'a.json'
+    assert not was_made_as(path, 'k')
+    for text in ('[]', '{', '{"key": "other"}', '[' * 100_000):
+        path.write_text(text)
+        assert not was_made_as(path, 'k')
+    path.write_text('{"key": "k"}')
+    assert was_made_as(path, 'k')
+
+
+def test_a_cell_that_is_no_number_of_any_kind_is_an_error_of_the_file(tmp_path: Path):
+    path = tmp_path / 'tracks.csv'
+    write_tracks(path, [10], [Track(Box(1, 2, 3, 4), TrackState.TRACKING)])
+    path.write_text(path.read_text() + '1' * 200_000 + '\n')
+    with pytest.raises(DatasetError, match=r'tracks.csv is no CSV'):
+        read_tracks(path)
+
+
 @pytest.mark.parametrize(('rows', 'line'), [(2, 3), (5, 4)])
 def test_a_result_file_with_the_wrong_number_of_rows_is_named(tmp_path: Path, rows, line):
     path = tmp_path / 'boxes.txt'
     path.write_text('1,2,3,4\n' * rows)
     with pytest.raises(DatasetError) as caught:
-        boxfiles.read(path, named(), opened(3), 3)
+        boxfiles.read(path, named(), opened(3), range(3))
     assert f'{path}, line {line}: {rows} boxes for room/ann, which has 3 frames' in str(
         caught.value
     )
@@ -330,7 +363,7 @@ def test_a_result_line_that_is_no_box_is_named(tmp_path: Path):
     path = tmp_path / 'boxes.txt'
     path.write_text('1,2,3,4\n1,2,3\n')
     with pytest.raises(DatasetError, match=r'boxes.txt, line 2'):
-        boxfiles.read(path, named(), opened(2), 2)
+        boxfiles.read(path, named(), opened(2), range(2))
 
 
 def test_missing_result_files_are_named_with_what_was_tried(tmp_path: Path):

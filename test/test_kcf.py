@@ -270,3 +270,17 @@ def test_the_table_of_a_small_folder(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert 'line 1' in capsys.readouterr().err
     assert otb_reference.main([str(tmp_path / 'nothing')]) == 2
     assert 'holds no sequence' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('variant', ['kcf', 'rgbd', 'rgbd_pf'])
+def test_a_new_start_forgets_the_response(variant: str) -> None:
+    rng = np.random.default_rng(2)
+    frame = Frame(
+        rng.integers(0, 256, (120, 160, 3), dtype=np.uint8), np.full((120, 160), 2.0, np.float32)
+    )
+    tracker = create_tracker(variant)
+    tracker.start(frame, Box(40, 30, 40, 40))
+    tracker.update(frame)
+    assert tracker.response is not None
+    tracker.start(frame, Box(60, 30, 40, 40))
+    assert tracker.response is None

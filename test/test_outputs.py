@@ -549,3 +549,13 @@ def test_a_folder_whose_stamps_stand_still_gives_a_bag_with_every_frame(tmp_path
     assert main(['convert', str(tmp_path / 'a'), str(tmp_path / 'a.mcap')]) == 0
     with open_recording(tmp_path / 'a.mcap') as recording:
         assert [frame.stamp_ns for frame in recording.frames()] == [5, 6, 7]
+
+
+def test_a_folder_that_replaced_another_may_be_closed_twice(tmp_path: Path) -> None:
+    write_one(tmp_path / 'a')
+    with SequenceWriter(tmp_path / 'a', overwrite=True) as folder:
+        folder.write(Frame(np.full((48, 64, 3), 90, np.uint8), None, 0))
+        folder.close()
+    with open_recording(tmp_path / 'a') as recording:
+        assert len(recording) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ['a']

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from pathlib import Path
 
@@ -14,7 +15,13 @@ import pytest
 from people_rig import COLS, ROWS, Someone, picture
 
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import LIMIT, Place, coverage, place_of
+from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import (
+    LIMIT,
+    NO_COVARIANCE,
+    Place,
+    coverage,
+    place_of,
+)
 from rgbd_kcf_tracker.evaluation.place_tables import places_table
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
@@ -264,7 +271,8 @@ def test_what_was_not_said_does_not_count_and_what_is_no_covariance_holds_nothin
     told = dataclasses.replace(hidden, predicted=(0.0, 0.0, 1.0), covariance=(0.0,) * 9)
     place = place_of(told, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     assert place is not None
-    assert (place.hidden, place.distance) == (True, math.inf)
+    assert (place.hidden, place.distance) == (True, NO_COVARIANCE)
+    assert json.loads(json.dumps(place.distance)) > LIMIT, 'a report keeps it'
     assert place_of(told, None, None) is None
     assert math.isnan(coverage([]).inside)
     assert math.isnan(coverage([place]).speed_inside)

@@ -295,3 +295,17 @@ def test_every_shared_sequence_reads(shared_data: Path) -> None:
             assert truth is None or len(truth) == len(recording), path
             frame = next(recording.frames())
             assert (frame.depth is not None) == (path / 'depth').is_dir(), path
+
+
+def test_a_warning_of_a_frame_is_told_once_however_often_it_is_read(tmp_path: Path) -> None:
+    folder(tmp_path)
+    (tmp_path / 'depth' / '000002.png').write_bytes(b'no image')
+    with open_recording(tmp_path) as recording:
+        for _ in range(3):
+            list(recording.frames())
+        assert len(recording.warnings) == 1
+
+
+def test_names_with_digits_that_are_no_numbers_are_sorted() -> None:
+    names = ['1\u00b23.png', '2.png', '10.png', '1.png']
+    assert sorted(names, key=natural_key)[-2:] == ['2.png', '10.png']

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -168,12 +169,26 @@ def test_a_parameter_that_does_nothing_has_p_1():
 
 def test_gains_on_few_and_on_many_sequences():
     rng = np.random.default_rng(3)
-    mean, low, high, p = sensitivity.gain(0.02 + 0.01 * rng.normal(size=30))
-    assert low < mean < high
-    assert low > 0
-    assert p < 0.01
-    assert sensitivity.gain(np.array([0.5]))[3] == 1.0, 'one sequence tells nothing'
-    assert sensitivity.gain(np.zeros(5)) == (0.0, 0.0, 0.0, 1.0)
+    many = sensitivity.gain(0.02 + 0.01 * rng.normal(size=30))
+    assert many is not None
+    assert 0 < many.low < many.mean < many.high
+    assert many.p < 0.01
+    one = sensitivity.gain(np.array([0.5]))
+    assert one is not None
+    assert one.p == 1.0, 'one sequence tells nothing'
+    assert sensitivity.gain(np.zeros(5)) == sensitivity.Gain(0.0, 0.0, 0.0, 1.0)
+    assert sensitivity.gain(np.array([0.1, math.nan, 0.2])) is None
+
+
+def test_whole_numbers_are_drawn_alike_the_ends_too():
+    (info,) = (i for i in describe(VARIANTS['metric'].parameters) if i.name == 'seed')
+    rng = np.random.default_rng(1)
+    for log, low in ((False, 0), (True, 1)):
+        drawn = [int(sweep.Axis(info, ('0', '4'), low, 4, log).draw(rng)) for _ in range(4000)]
+        counts = np.bincount(drawn, minlength=5)[low:]
+        assert set(drawn) == set(range(low, 5))
+        if not log:
+            assert counts.min() > 700
 
 
 def test_holm_bounds():

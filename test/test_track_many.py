@@ -368,6 +368,12 @@ def test_the_same_command_beside_itself_harms_neither(
     assert [p.name for p in (tmp_path / 'o' / 'tracks').iterdir()] == ['normal_0.csv']
 
 
+def test_rows_are_joined_whatever_their_files_are_called(tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text('x\n1\n')
+    join_csv({'a\udcff': tmp_path / 'a.csv'}, tmp_path / 'all.csv')
+    assert (tmp_path / 'all.csv').read_text().splitlines()[1] == 'a\\udcff,1'
+
+
 def test_a_worker_that_dies_leaves_nothing_half(recordings: Path, tmp_path: Path):
     """The name of a file is given when it is whole; what a dead worker left is cleared away."""
     output = tmp_path / 'o' / 'tracks'

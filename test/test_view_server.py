@@ -294,6 +294,25 @@ def test_nothing_is_shown_before_the_token_is_given(server: Server, stub: Stub) 
 
 
 @pytest.mark.parametrize('server', [TOKEN], indirect=True)
+def test_guessing_many_tokens_at_once_is_no_faster(server: Server) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        async def guess(token: str) -> int:
+            async with session.post(
+                server.url + 'login', data={'token': token}, headers={'Origin': origin(server)}
+            ) as answer:
+                return answer.status
+
+        first = asyncio.ensure_future(guess('wrong horse'))
+        await asyncio.sleep(0.3)
+        guesses = await asyncio.gather(*(guess(f'horse {i}') for i in range(20)), guess(TOKEN))
+        assert set(guesses) == {429}
+        assert await first == 401
+        assert await guess(TOKEN) == 200
+
+    run(ask)
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
 def test_a_login_too_large_is_refused(server: Server) -> None:
     async def ask(session: aiohttp.ClientSession) -> None:
         async with session.post(

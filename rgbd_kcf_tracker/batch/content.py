@@ -59,7 +59,13 @@ _Entry = tuple[str, Path | None, os.stat_result | None]
 def _files(path: Path) -> Iterator[_Entry]:
     """Name within the digest, place and state of a file, or of the files in a folder."""
     if path.is_dir():
-        for folder, subfolders, names in os.walk(path):
+        seen: set[tuple[int, int]] = set()
+        for folder, subfolders, names in os.walk(path, followlinks=True):
+            state = os.stat(folder)
+            if (state.st_dev, state.st_ino) in seen:  # links may lead in circles
+                subfolders[:] = []
+                continue
+            seen.add((state.st_dev, state.st_ino))
             subfolders[:] = sorted(n for n in subfolders if not n.startswith('.'))
             for name in sorted(n for n in names if not n.startswith('.')):
                 file = Path(folder, name)

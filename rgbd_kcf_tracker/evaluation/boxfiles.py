@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence as Items
 from pathlib import Path
 
 import numpy as np
@@ -55,22 +56,23 @@ def find_file(pattern: str, sequence: Sequence) -> Path:
     )
 
 
-def read(path: Path, sequence: Sequence, opened: Opened, frames: int) -> list[Track]:
+def read(path: Path, sequence: Sequence, opened: Opened, numbers: Items[int]) -> list[Track]:
     """One track per frame that is measured.
 
     Args:
         path: of the boxes.
         sequence: gives the kind and the origin of pixel coordinates.
-        opened: gives the place of the measured frames in the recording.
-        frames: how many are measured.
+        opened: gives the length of the recording.
+        numbers: those of the measured frames in the recording, from 0.
 
     Raises:
         DatasetError: naming file and line where a line is no box or there are too few or too many.
     """
     rows = _read_rows(path, sequence)
-    total = opened.total
-    if total is not None and len(rows) == total and total != frames:
-        rows = rows[opened.start : opened.start + frames]
+    frames = len(numbers)
+    total = opened.length if opened.total is None else opened.total
+    if len(rows) == total and total != frames:
+        rows = [rows[number] for number in numbers]
     if len(rows) != frames:
         line = min(len(rows), frames) + (2 if _is_ours(path) else 1)
         wanted = f'{frames}' if total in (None, frames) else f'{frames} or {total}'

@@ -28,7 +28,13 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, Sequence
 from rgbd_kcf_tracker.evaluation.metrics.everyone import Everyone, score
 from rgbd_kcf_tracker.evaluation.passes import Pass
-from rgbd_kcf_tracker.evaluation.store import left_by_a_run, read_json, slug, write_json
+from rgbd_kcf_tracker.evaluation.store import (
+    left_by_a_run,
+    read_json,
+    slug,
+    was_made_as,
+    write_json,
+)
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.recordings.mot import Sightings, mot_text, read_mot
@@ -256,10 +262,7 @@ def is_done(folder: Path, sequence: Sequence, tracker: str, key: str) -> bool:
     places = Places(folder, sequence.name)
     if not (places.truth.is_file() and places.tracks(tracker).is_file()):
         return False
-    try:
-        return bool(read_json(places.meta(tracker)).get('key') == key)
-    except RgbdKcfError:
-        return False
+    return was_made_as(places.meta(tracker), key)
 
 
 def read(folder: Path, sequence: Sequence, tracker: str) -> EveryoneResult:

@@ -9,6 +9,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Iterable, Iterator
+from collections.abc import Sequence as Items
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sequence,
     at_rate,
     from_first_view,
+    numbered,
     with_intrinsics,
     without_depth,
 )
@@ -35,6 +37,7 @@ from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
 from rgbd_kcf_tracker.evaluation.passes import Notes, OnePass, Thumbnails, WithRestarts, run, trace
 from rgbd_kcf_tracker.evaluation.store import (
     slug,
+    was_made_as,
     write_json,
     write_tracks,
     write_truth,
@@ -148,11 +151,7 @@ def is_done(folder: Path, sequence: Sequence, contender: Contender, options: Run
     tracks = tracks_path(folder, contender.name, sequence.name)
     if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
         return False
-    try:
-        meta = json.loads(meta_path(tracks).read_text(encoding='utf-8'))
-    except (OSError, ValueError):
-        return False
-    return bool(meta.get('key') == run_key(sequence, contender, options))
+    return was_made_as(meta_path(tracks), run_key(sequence, contender, options))
 
 
 def run_job(job: Job) -> Packed[list[Failure]]:
@@ -188,7 +187,7 @@ def _run_sequence(job: Job) -> list[Failure]:
             if options.short_term and opened.annotated:
                 restarts[contender.name] = WithRestarts(contender.make())
     thumbnails, truth = Thumbnails(), Notes()
-    samples = as_asked(from_first_view(opened.samples), sequence, options)
+    samples = as_asked(from_first_view(numbered(opened)), sequence, options)
     run(samples, truth, thumbnails, *passes.values(), *restarts.values())
     stamps = truth.stamps_ns
     if not stamps:
@@ -201,7 +200,7 @@ def _run_sequence(job: Job) -> list[Failure]:
 
     failures = []
     for contender in job.contenders:
-        one = passes.get(contender.name) or _from_file(contender, sequence, opened, len(stamps))
+        one = passes.get(contender.name) or _from_file(contender, sequence, opened, truth.numbers)
         restart = restarts.get(contender.name)
         reason = one.error or (restart.error if restart else '')
         if reason:
@@ -221,16 +220,18 @@ def _run_sequence(job: Job) -> list[Failure]:
 
 def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
     sequence, options = job.sequence, job.options
-    samples = as_asked(opened.samples, sequence, options)
+    samples = as_asked(numbered(opened), sequence, options)
     keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
     failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
     return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]
 
 
-def _from_file(contender: Contender, sequence: Sequence, opened: Opened, frames: int) -> OnePass:
+def _from_file(
+    contender: Contender, sequence: Sequence, opened: Opened, numbers: Items[int]
+) -> OnePass:
     try:
         path = boxfiles.find_file(contender.target, sequence)
-        return OnePass(None, tracks=boxfiles.read(path, sequence, opened, frames))
+        return OnePass(None, tracks=boxfiles.read(path, sequence, opened, numbers))
     except RgbdKcfError as error:
         return OnePass(None, error=str(error))
 

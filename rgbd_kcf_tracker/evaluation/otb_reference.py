@@ -56,7 +56,7 @@ def boxes_of(folder: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     run(opened.samples, truth, one)
     one.check()
     path = folder / 'results' / f'{REFERENCE}.txt'
-    published = boxfiles.read(path, sequence, opened, len(truth.visible))
+    published = boxfiles.read(path, sequence, opened, range(len(truth.visible)))
     ours, theirs = ([track.box for track in tracks] for tracks in (one.tracks, published))
     return as_array(ours), as_array(theirs), as_array(truth.visible)
 

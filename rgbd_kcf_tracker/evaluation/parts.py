@@ -132,7 +132,9 @@ def _take(
                         f'{path} and {first[0]} are parts of different runs: {differ}: run all '
                         'parts with the same command and versions'
                     )
-        found.setdefault(index, (path, content))
+        known = found.setdefault(index, (path, content))
+        if known[1] != content:
+            raise DatasetError(f'{path} and {known[0]} are the same part with other results')
     except (KeyError, TypeError):
         raise DatasetError(f'{path} is no part that --shard wrote') from None
 

@@ -172,11 +172,13 @@ class Notes:
     Attributes:
         size: width and height of the last image.
         stamps_ns: of the frames.
+        numbers: of the frames in the recording, from 0.
         visible, bodies, fractions, judged, positions, velocities: see :class:`Sample`.
     """
 
     size: tuple[int, int] = (0, 0)
     stamps_ns: list[int] = field(default_factory=list)
+    numbers: list[int] = field(default_factory=list)
     visible: list[Box | None] = field(default_factory=list)
     bodies: list[Box | None] = field(default_factory=list)
     fractions: list[float | None] = field(default_factory=list)
@@ -188,6 +190,7 @@ class Notes:
         """Note one more."""
         self.size = sample.frame.width, sample.frame.height
         self.stamps_ns.append(sample.frame.stamp_ns)
+        self.numbers.append(sample.number)
         self.visible.append(sample.visible)
         self.bodies.append(sample.body)
         self.fractions.append(sample.fraction)

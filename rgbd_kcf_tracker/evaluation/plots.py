@@ -178,7 +178,8 @@ def honesty_plot(found: Mapping[tuple[str, str], Scored]) -> bytes:
 
 def least_shown(curves: Iterable[FloatArray]) -> float:
     """Where an axis of shares is to begin, so that curves near 1 can be told apart."""
-    return min(0.9, *(math.floor(10 * np.nanmin(curve)) / 10 for curve in curves))
+    shown = [curve[~np.isnan(curve)] for curve in curves]
+    return min([0.9, *(math.floor(10 * float(curve.min())) / 10 for curve in shown if curve.size)])
 
 
 def expected_overlap_plot(

@@ -16,6 +16,7 @@ from rgbd_kcf_tracker.evaluation.metrics import (
     calibration,
     longterm,
     otb,
+    sensitivity,
 )
 from rgbd_kcf_tracker.evaluation.metrics.confusion import HIT_IOU, UNDETERMINED, Confusion
 from rgbd_kcf_tracker.evaluation.metrics.presence import STRANGER_IOU
@@ -304,10 +305,8 @@ def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> 
     known = values[~np.isnan(values)]
     if len(known) < 2:
         return math.nan, math.nan
-    rng = np.random.default_rng(0)
-    means = rng.choice(known, (2000, len(known))).mean(axis=1)
-    low, high = np.percentile(means, [2.5, 97.5])
-    return float(low), float(high)
+    low, high = sensitivity.bootstrap(known[None])
+    return float(low[0]), float(high[0])
 
 
 def number(measured: Measured) -> str:

@@ -109,6 +109,14 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
+def was_made_as(path: Path, key: str) -> bool:
+    """Whether the JSON beside a result says that it was made so; False where there is none."""
+    try:
+        return bool(read_json(path).get('key') == key)
+    except DatasetError:
+        return False
+
+
 def write_tracks(path: Path, stamps_ns: Sequence[int], tracks: Sequence[Track]) -> None:
     """One row per frame, as ``rgbd-kcf track --output`` writes them."""
     pairs = zip(stamps_ns, tracks, strict=True)
@@ -193,8 +201,8 @@ def _rows(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
             return list(reader)
     except OSError as error:
         raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
-    except UnicodeDecodeError:
-        raise DatasetError(f'{path} is not a text file') from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise DatasetError(f'{path} is no CSV: {error}') from None
 
 
 def _cells(box: Box | None) -> tuple[str, ...]:

@@ -57,11 +57,12 @@ class Axis:
         """One value at random."""
         if math.isnan(self.low):
             return self.values[int(rng.integers(len(self.values)))]
-        low, high = (math.log(v) for v in (self.low, self.high)) if self.log else (
-            self.low, self.high
-        )  # fmt: skip
-        value = float(rng.uniform(low, high))
-        return _text(self.info, math.exp(value) if self.log else value)
+        # Whole numbers stand for all that is rounded to them, the ends too.
+        spare = 0.49 if self.info.type is int else 0.0
+        low, high = self.low - spare, self.high + spare
+        if self.log:
+            return _text(self.info, math.exp(rng.uniform(math.log(low), math.log(high))))
+        return _text(self.info, float(rng.uniform(low, high)))
 
 
 @dataclass(frozen=True, slots=True)

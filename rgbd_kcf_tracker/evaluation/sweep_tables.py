@@ -131,7 +131,8 @@ def all_tables(found: Found) -> list[Table]:
 def held_out(found: Found) -> Table:
     """The default and the finalists on sequences that took no part in choosing."""
     gains = [sensitivity.gain(found.held_out[i] - found.held_out[0]) for i in _places(found)]
-    ps = sensitivity.holm([p for *_, p in gains])
+    known = [gain for gain in gains if gain is not None]
+    ps = iter(sensitivity.holm([gain.p for gain in known]))
     rows: list[tuple[Cell, ...]] = [
         (
             'default', *_values(found, found.default),
@@ -139,22 +140,22 @@ def held_out(found: Found) -> Table:
             found.scale * float(found.held_out[0].mean()), None, '', None, '',
         )
     ]  # fmt: skip
-    for place, index, (mean, low, high, _), p in zip(
-        _places(found), found.finalists, gains, ps, strict=True
-    ):
+    for place, index, gain in zip(_places(found), found.finalists, gains, strict=True):
         one = found.settings[index]
-        good = found.sign * mean > 0
+        row: tuple[Cell, ...] = (
+            one.contender.name, *_values(found, one),
+            found.scale * float(found.tried[1 + index].mean()),
+            found.scale * float(found.held_out[place].mean()),
+        )  # fmt: skip
+        if gain is None:
+            rows.append((*row, None, '', None, 'failed here'))
+            continue
+        p = next(ps)
         told = 'not told from noise'
         if p < sensitivity.LEVEL:
-            told = 'better' if good else 'worse'
-        rows.append(
-            (
-                one.contender.name, *_values(found, one),
-                found.scale * float(found.tried[1 + index].mean()),
-                found.scale * float(found.held_out[place].mean()),
-                found.scale * mean, _interval(found, low, high), p, told,
-            )
-        )  # fmt: skip
+            told = 'better' if found.sign * gain.mean > 0 else 'worse'
+        interval = _interval(found, gain.low, gain.high)
+        rows.append((*row, found.scale * gain.mean, interval, p, told))
     count = found.held_out.shape[1]
     return Table(
         'held_out',
@@ -218,13 +219,14 @@ def best_settings(found: Found) -> Table:
     ]  # fmt: skip
     for index in best(found.tried, SHOWN, found.sign):
         difference = found.tried[1 + index] - found.tried[0]
-        mean, low, high, _ = sensitivity.gain(difference)
+        gain = sensitivity.gain(difference)
         one = found.settings[index]
         rows.append(
             (
                 one.contender.name, *_values(found, one),
-                found.scale * float(found.tried[1 + index].mean()), found.scale * mean,
-                _interval(found, low, high),
+                found.scale * float(found.tried[1 + index].mean()),
+                None if gain is None else found.scale * gain.mean,
+                '' if gain is None else _interval(found, gain.low, gain.high),
             )
         )  # fmt: skip
     failed = int(np.isnan(found.tried[1:]).any(axis=1).sum())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import dataclass
 
 Cell = str | float | int | None
@@ -43,7 +44,7 @@ class Table:
         writer.writerow(self.columns)
         for row in self.rows:
             writer.writerow(
-                ['' if v is None else f'{v:.6g}' if isinstance(v, float) else v for v in row]
+                ['' if _absent(v) else f'{v:.6g}' if isinstance(v, float) else v for v in row]
             )
         return text.getvalue()
 
@@ -75,11 +76,16 @@ class Table:
         others = [
             v
             for r in self.rows
-            if isinstance(v := r[column], float) and not str(r[0]).startswith(self.quoted)
+            if isinstance(v := r[column], float)
+            and not (_absent(v) or str(r[0]).startswith(self.quoted))
         ]
         return len(others) > 1 and value == (max if self.best == 'max' else min)(others)
 
     def _cell(self, value: Cell) -> str:
-        if value is None:
+        if _absent(value):
             return '-'
         return f'{value:.{self.digits}f}' if isinstance(value, float) else str(value)
+
+
+def _absent(value: Cell) -> bool:
+    return value is None or (isinstance(value, float) and math.isnan(value))

@@ -33,7 +33,13 @@ from rgbd_kcf_tracker.recordings.images import (
 )
 from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
-from rgbd_kcf_tracker.recordings.recording import NO_DEPTH, Closing, ReadOptions, RecordingInfo
+from rgbd_kcf_tracker.recordings.recording import (
+    NO_DEPTH,
+    Closing,
+    ReadOptions,
+    RecordingInfo,
+    once,
+)
 from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.storage import Topic
 from rgbd_kcf_tracker.recordings.textfiles import known
@@ -53,7 +59,7 @@ class BagRecording(Closing):
         self._max_pixels = options.max_pixels
         self.bag = RawBag(path)
         self.warnings: list[str] = list(self.bag.warnings)
-        self._warned: set[str] = set()
+        self._warn = once(self.warnings)
         try:
             self._images = look_at_images(self.bag)
             self.topics = self._choose(options)
@@ -177,11 +183,6 @@ class BagRecording(Closing):
                 ) from None
             self._warn(f'frame {number} of {self.topics.depth} is read without depth: {error}')
             return None
-
-    def _warn(self, text: str) -> None:
-        if text not in self._warned:
-            self._warned.add(text)
-            self.warnings.append(text)
 
     def _open_cameras(self, rectified: str) -> BagCameras | None:
         if self.topics.info is None:

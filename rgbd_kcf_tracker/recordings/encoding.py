@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ImageError
+from rgbd_kcf_tracker.frame import is_reading
 from rgbd_kcf_tracker.recordings import rvl
 from rgbd_kcf_tracker.recordings.images import ColorImage, DepthImage
 
@@ -137,7 +138,7 @@ def encode_compressed_depth(
         a = _QUANTIZATION * (_QUANTIZATION + 1)
         b = 1 - a / depth_max_m
         with np.errstate(invalid='ignore'):
-            far = ~(depth < depth_max_m)
+            far = ~(is_reading(depth) & (depth < depth_max_m))
             inverse = np.rint(a / depth + b)
         values = np.where(far, 0, np.clip(np.nan_to_num(inverse), 0, 65535)).astype(np.uint16)
     head = struct.pack('<iff', _INVERSE_DEPTH, a, b)

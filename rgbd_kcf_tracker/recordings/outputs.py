@@ -281,7 +281,7 @@ class OutputFolder:
     ) -> None:
         self.path = Path(path)
         self._target = _target(self.path)
-        self._known = known
+        self._known, self._ended = known, False
         _check_place(self.path, self._target)
         there = _stat(self._target)
         self._made = there is None
@@ -304,6 +304,9 @@ class OutputFolder:
 
     def end(self, *, whole: bool, anything: bool) -> None:
         """Put the folder in its place; see :meth:`OutputFile.end`."""
+        if self._ended:
+            return
+        self._ended = True
         replaces = self.place != self._target
         try:
             if not anything:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeVar
@@ -123,6 +123,18 @@ class RecordingInfo:
     truth_frames: int | None = None
     problem: str = ''
     warnings: tuple[str, ...] = field(default=())
+
+
+def once(warnings: list[str]) -> Callable[[str], None]:
+    """Adds to a list of warnings what is not in it."""
+    told = set(warnings)
+
+    def tell(text: str) -> None:
+        if text not in told:
+            told.add(text)
+            warnings.append(text)
+
+    return tell
 
 
 class Closing(ABC):

@@ -9,6 +9,7 @@ import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.recordings.outputs import moved_into_place
@@ -26,14 +27,20 @@ def write_rows(path: Path, header: Sequence[str], rows: Iterable[Sequence[object
     Raises:
         RecordingError: where it cannot be written.
     """
-    with (
-        moved_into_place(path) as temporary,
-        # Names of files need not be UTF-8.
-        temporary.open('w', encoding='utf-8', errors='backslashreplace', newline='') as file,
-    ):
+    with _written(path) as file:
         writer = csv.writer(file, lineterminator='\n')
         writer.writerow(header)
         writer.writerows(rows)
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[TextIO]:
+    """A text file that is put in its place when it is whole; names in it need not be UTF-8."""
+    with (
+        moved_into_place(path) as temporary,
+        temporary.open('w', encoding='utf-8', errors='backslashreplace', newline='') as file,
+    ):
+        yield file
 
 
 def join_csv(files: Mapping[str, Path], path: Path) -> None:
@@ -53,10 +60,7 @@ def join_csv(files: Mapping[str, Path], path: Path) -> None:
         _join_parquet(files, path)
         return
     header = _common_header(files)
-    with (
-        moved_into_place(path) as temporary,
-        temporary.open('w', encoding='utf-8', newline='') as file,
-    ):
+    with _written(path) as file:
         writer = csv.writer(file, lineterminator='\n')
         writer.writerow([SOURCE, *header])
         for name, source in files.items():

@@ -32,6 +32,7 @@ from rgbd_kcf_tracker.recordings.recording import (
     ReadOptions,
     RecordingInfo,
     StreamInfo,
+    once,
 )
 from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.textfiles import (
@@ -90,6 +91,7 @@ class SequenceFolder(Closing):
         self.intrinsics: Intrinsics | None = self._files.intrinsics
         self.groundtruth = self._read_truth('groundtruth.txt')
         self.groundtruth_body = known(self._read_truth('groundtruth_body.txt'))
+        self._warn = once(self.warnings)
 
     def __len__(self) -> int:
         return len(self._files)
@@ -99,9 +101,9 @@ class SequenceFolder(Closing):
         odd = RefusedReadings()
         try:
             for index in range(max(start, 0), min(len(self), len(self) if end is None else end)):
-                yield self._files.frame(index, self.warnings.append, odd)
+                yield self._files.frame(index, self._warn, odd)
         finally:
-            odd.tell(self.warnings.append)
+            odd.tell(self._warn)
 
     def info(self) -> RecordingInfo:
         """See :meth:`Recording.info`."""

@@ -28,7 +28,7 @@ LAST_STAMP_NS = (1 << 31) * NANOSECONDS
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     """Sorts ``10.png`` after ``9.png``."""
     return tuple(
-        (0, int(part), '') if part.isdigit() else (1, 0, part)
+        (0, int(part), '') if part.isdecimal() else (1, 0, part)
         for part in re.split(r'(\d+)', name)
         if part
     )

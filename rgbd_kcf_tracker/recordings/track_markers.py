@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.recordings.overlay import id_color
 from rgbd_kcf_tracker.recordings.track_messages import MARKER_LIFETIME_NS, TrackMessages
 from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 
-ELLIPSOID = math.sqrt(7.815)
+ELLIPSOID = math.sqrt(7.814728)
 """Standard deviations of the ellipsoid that holds 95 % (chi-square of three dimensions)."""
 ARROW = (0.04, 0.1, 0.12)
 """Metres of an arrow's shaft and head across, and of its head's length."""

@@ -114,7 +114,7 @@ class DepthAwareTracker(ABC):
         """
         require_inside(box, frame)
         p = self._depth_parameters
-        self._box = box
+        self._box, self.response = box, None
         self._image_size = (frame.width, frame.height)
         self._stamp_ns = self._seen_ns = frame.stamp_ns
         self._hidden = False

@@ -100,7 +100,6 @@ class KcfParameters(Parameters):
         'twice halve_above, as people near a camera of 1920x1080, then costs more with its size.',
         minimum=0,
         maximum=6,
-        source=_REFERENCE,
     )
 
 
@@ -252,7 +251,6 @@ class KcfTracker:
     def __init__(self, parameters: KcfParameters) -> None:
         self._parameters = parameters
         self.response: float | None = None
-        self._track = Track(None, TrackState.IDLE)
         self._model: KcfModel | None = None
         self._box = Box(0, 0, 1, 1)
         self._image_size = (0, 0)
@@ -264,7 +262,7 @@ class KcfTracker:
             BoxError: where the box lies wholly outside the image.
         """
         require_inside(box, frame)
-        self._box = box
+        self._box, self.response = box, None
         self._image_size = (frame.width, frame.height)
         self._model = KcfModel(box.width, box.height, self._parameters)
         self._model.train(frame, box.cx, box.cy)

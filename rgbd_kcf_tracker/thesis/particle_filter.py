@@ -91,9 +91,11 @@ class ParticleFilter:
         """
         count = round(share * len(self.states))
         corner = self._rng.random((count, 2)) * image - (box.width / 2, box.height / 2)
-        self.states[:count] = 0
-        self.states[:count, [X, Y]] = corner
-        self.states[:count, [WIDTH, HEIGHT]] = box.width, box.height
+        # Any: resampling leaves the offspring of what was thrown last time beside each other.
+        thrown = self._rng.choice(len(self.states), count, replace=False)
+        self.states[thrown] = 0
+        self.states[thrown[:, None], [X, Y]] = corner
+        self.states[thrown[:, None], [WIDTH, HEIGHT]] = box.width, box.height
         self.weights[:] = 1 / len(self.weights)
 
     def rescale(self, across: float, down: float, noise: ProcessNoise) -> None:

@@ -189,9 +189,10 @@ class LivePage:
     # -- what the node says -----------------------------------------------------------------------
 
     def rename(self, number: int, name: str) -> None:
-        """Call a target by a name, in this page alone; the first two hundred are kept."""
+        """Call a target by a name, in this page alone; the last two hundred named are kept."""
         if name:
             self._names[number] = name
+            self._names.move_to_end(number)
             while len(self._names) > _MOST_NAMES:
                 self._names.popitem(last=False)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import logging
 import queue
 import threading
 import time
@@ -43,6 +44,7 @@ STAGES = ('read', 'track', 'show')
 WARM_UP = 30
 """Frames before the one shown from which a run that follows everyone goes on: who stands before a
 room is known when the room is."""
+_LOG = logging.getLogger(__name__)
 _IDLE_S = 0.2
 
 
@@ -207,6 +209,10 @@ class Player:
         except RgbdKcfError as error:
             self._playing = False
             self._say(str(error))
+        except Exception as error:  # a bug must not leave a page that does not answer any more
+            _LOG.exception('the player could not go on')
+            self._playing = False
+            self._say(f'internal error: {type(error).__name__}: {error}')
 
     def _say(self, word: str) -> None:
         self._word = word
@@ -223,7 +229,7 @@ class Player:
         values = command.values
         if command.do == 'play':
             if self._shown >= len(self._recording) - 1:
-                self._go_to(0 if self._first == 0 else self._first)
+                self._go_to(self._first)
             self._playing, self._due = True, time.monotonic()
         elif command.do == 'pause':
             self._playing = False

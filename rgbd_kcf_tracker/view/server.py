@@ -37,7 +37,7 @@ LOOPBACK = ('127.0.0.1', 'localhost', '::1')
 MOST_BROWSERS = 16
 SHORTEST_TOKEN = 8
 WRONG_TOKEN_S = 1.0
-"""Wait after a wrong token; they are answered one at a time, so guessing is slow for everybody."""
+"""Wait after a wrong token, in which no other is looked at: guessing is slow for everybody."""
 FORM_S = 5.0
 """Longest wait for the rest of a form: who sends none of it would hold a connection for ever."""
 COMMANDS_S = 60
@@ -246,6 +246,8 @@ class Server:
             raise web.HTTPRequestTimeout from None
         except (ValueError, LookupError, web.RequestPayloadError):
             raise web.HTTPBadRequest from None
+        if self._wrong.locked():  # or who asks often enough at once would not have to wait
+            raise web.HTTPTooManyRequests(text='A wrong token was just given: try again')
         given = form.get('token')
         said = given if isinstance(given, str) else ''
         if not self._token or _equal(said, self._token):
@@ -306,6 +308,15 @@ class Server:
         self, connected: web.WebSocketResponse, news: asyncio.Event, drawn: asyncio.Event
     ) -> None:
         """Send the newest moment, and the next only when that one is drawn."""
+        try:
+            await self._send_moments(connected, news, drawn)
+        except Exception:
+            await connected.close(code=1011, message=b'internal error')  # or the page would freeze
+            raise
+
+    async def _send_moments(
+        self, connected: web.WebSocketResponse, news: asyncio.Event, drawn: asyncio.Event
+    ) -> None:
         await connected.send_json({'hello': self._controller.description()})
         number, since = 0, (-1, 0)
         while not connected.closed:

@@ -65,7 +65,7 @@ class Sample:
         fraction: how much of the target shows, 0 to 1, None where unknown.
         judged: False where the truth leaves open what is right: the frame does not count.
         people: everyone, of a sequence of kind :data:`EVERYONE`.
-        number: of the frame in the recording, from 0; of a sequence of that kind.
+        number: of the frame in the recording, from 0, see :func:`numbered`.
         position: of the middle of the target's body, ``(x, y, z)`` metres in the camera's optical
             frame, None where unknown.
         velocity: of the same over the ground, in metres per second along the same axes.
@@ -151,6 +151,12 @@ def broken(path: Path, reason: str) -> Sequence:
 
 def _fail(reason: str) -> Opened:
     raise DatasetError(reason)
+
+
+def numbered(opened: Opened) -> Iterator[Sample]:
+    """The samples with the numbers of their frames in the recording."""
+    for number, sample in enumerate(opened.samples, opened.start):
+        yield dataclasses.replace(sample, number=number)
 
 
 def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:

@@ -76,7 +76,7 @@ def load(path: Path, fps: float) -> Opened:
         nobody = [None] * len(frames)
         for number, sample in enumerate(with_truth(frames, nobody)):
             present = tuple(people.get(number, ()))
-            yield dataclasses.replace(sample, people=present, number=number)
+            yield dataclasses.replace(sample, people=present)
 
     known = any(p.body is not None for present in people.values() for p in present)
     return Opened(samples(), len(frames), total=len(frames), has_body=known)

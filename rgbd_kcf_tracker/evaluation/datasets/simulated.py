@@ -131,7 +131,7 @@ def load_everyone(
         )
 
     def samples() -> Iterator[Sample]:
-        for number, moment in enumerate(scene):
+        for moment in scene:
             people = tuple(
                 Annotation(
                     who, truth.shown, truth.visible_fraction >= BARELY_VISIBLE, truth.body,
@@ -140,6 +140,6 @@ def load_everyone(
                 for who, truth in moment.truths.items()
                 if truth.shown is not None
             )  # fmt: skip
-            yield Sample(moment.frame, None, people=people, number=number)
+            yield Sample(moment.frame, None, people=people)
 
     return Opened(samples(), len(scene), has_body=True)

@@ -20,6 +20,8 @@ from rgbd_kcf_tracker.track import Track
 
 LIMIT = 7.814728
 """95 % of a chi-squared variable of three degrees of freedom lie below."""
+NO_COVARIANCE = 1e12
+"""Squared Mahalanobis distance of what was told with none: beyond any limit, and kept by JSON."""
 Triple = tuple[float, float, float]
 
 
@@ -92,14 +94,14 @@ def coverage(places: Sequence[Place]) -> Coverage:
 
 
 def _distance(told: Triple, true: Triple, covariance: Sequence[float]) -> tuple[float, float]:
-    """Squared Mahalanobis distance and length of an error; infinite for no covariance."""
+    """Squared Mahalanobis distance and length of an error; see :data:`NO_COVARIANCE`."""
     error = np.subtract(told, true)
     spread: FloatArray = np.array(covariance, np.float64).reshape(3, 3)
     length = float(np.linalg.norm(error))
     try:
         root = np.linalg.cholesky(spread)
     except np.linalg.LinAlgError:
-        return math.inf, length
+        return NO_COVARIANCE, length
     return float(np.square(np.linalg.solve(root, error)).sum()), length
 
 

@@ -87,21 +87,39 @@ def effect(scores: FloatArray, labels: Labels, balanced: bool) -> Effect:
     )
 
 
-def gain(differences: FloatArray) -> tuple[float, float, float, float]:
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """By how much a setting is better than another.
+
+    Attributes:
+        mean: over independent sequences.
+        low, high: its 95 % interval.
+        p: of a mean as far from 0 by chance (signs dealt out anew).
+    """
+
+    mean: float
+    low: float
+    high: float
+    p: float
+
+
+def gain(differences: FloatArray) -> Gain | None:
     """Whether a setting is better than another on independent sequences.
 
     Args:
         differences: ``(Q,)`` of the scores of the two.
 
     Returns:
-        Mean, its 95 % interval, and p of a mean as far from 0 by chance (signs dealt out anew).
+        None where one of them is not known.
     """
+    if np.isnan(differences).any():
+        return None
     rng = np.random.default_rng(SEED)
     mean = float(differences.mean())
     signs = rng.choice([-1.0, 1.0], (ROUNDS, len(differences)))
     low, high = bootstrap(differences[None])
     p = _p(abs(mean), np.abs((signs * differences).mean(axis=1)))
-    return mean, float(low[0]), float(high[0]), p
+    return Gain(mean, float(low[0]), float(high[0]), p)
 
 
 def bootstrap(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
