@@ -19,7 +19,6 @@ import rgbd_kcf_tracker
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
-from rgbd_kcf_tracker.evaluation.datasets.base import numbered
 from rgbd_kcf_tracker.evaluation.everyone import follow
 from rgbd_kcf_tracker.evaluation.metrics.everyone import ALPHAS, mean, overlaps, score
 from rgbd_kcf_tracker.geometry import Box
@@ -303,7 +302,7 @@ def pair(tmp_path: Path) -> Path:
 
 def opened(path: Path, **options):
     (sequence,) = open_dataset(str(path), DatasetOptions(everyone=True, **options))
-    return sequence, list(numbered(sequence.open()))
+    return sequence, list(sequence.open().samples)
 
 
 def test_a_recording_with_mot_text(pair: Path):

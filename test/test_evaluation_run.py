@@ -20,7 +20,6 @@ from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.evaluation import boxfiles, contenders, runner
 from rgbd_kcf_tracker.evaluation.contenders import Contender, OpenCvTracker
 from rgbd_kcf_tracker.evaluation.datasets import Opened, Sample, Sequence
-from rgbd_kcf_tracker.evaluation.datasets.base import numbered
 from rgbd_kcf_tracker.evaluation.export import export
 from rgbd_kcf_tracker.evaluation.jobs import (
     RunOptions,
@@ -327,7 +326,7 @@ def test_boxes_of_the_whole_recording_are_those_of_the_frames_measured_at_a_rate
 
 def test_samples_have_the_numbers_of_their_frames():
     samples = list(moving_samples(4, 1))
-    assert [s.number for s in numbered(Opened(samples, 4, 7))] == [7, 8, 9, 10]
+    assert [s.number for s in Opened(samples, 4, 7).samples] == [7, 8, 9, 10]
 
 
 def test_what_lies_beside_a_result_and_is_damaged_vouches_for_nothing(tmp_path: Path):

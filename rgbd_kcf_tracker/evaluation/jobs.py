@@ -28,7 +28,6 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     Sequence,
     at_rate,
     from_first_view,
-    numbered,
     with_intrinsics,
     without_depth,
 )
@@ -187,7 +186,7 @@ def _run_sequence(job: Job) -> list[Failure]:
             if options.short_term and opened.annotated:
                 restarts[contender.name] = WithRestarts(contender.make())
     thumbnails, truth = Thumbnails(), Notes()
-    samples = as_asked(from_first_view(numbered(opened)), sequence, options)
+    samples = as_asked(from_first_view(opened.samples), sequence, options)
     run(samples, truth, thumbnails, *passes.values(), *restarts.values())
     stamps = truth.stamps_ns
     if not stamps:
@@ -220,7 +219,7 @@ def _run_sequence(job: Job) -> list[Failure]:
 
 def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
     sequence, options = job.sequence, job.options
-    samples = as_asked(numbered(opened), sequence, options)
+    samples = as_asked(opened.samples, sequence, options)
     keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
     failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
     return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]

@@ -65,7 +65,7 @@ class Sample:
         fraction: how much of the target shows, 0 to 1, None where unknown.
         judged: False where the truth leaves open what is right: the frame does not count.
         people: everyone, of a sequence of kind :data:`EVERYONE`.
-        number: of the frame in the recording, from 0, see :func:`numbered`.
+        number: of the frame in the recording, from 0; :class:`Opened` gives it.
         position: of the middle of the target's body, ``(x, y, z)`` metres in the camera's optical
             frame, None where unknown.
         velocity: of the same over the ground, in metres per second along the same axes.
@@ -104,6 +104,11 @@ class Opened:
     annotated: bool = True
     has_body: bool = False
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        samples = enumerate(self.samples, self.start)
+        numbered = (dataclasses.replace(sample, number=number) for number, sample in samples)
+        object.__setattr__(self, 'samples', numbered)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,12 +156,6 @@ def broken(path: Path, reason: str) -> Sequence:
 
 def _fail(reason: str) -> Opened:
     raise DatasetError(reason)
-
-
-def numbered(opened: Opened) -> Iterator[Sample]:
-    """The samples with the numbers of their frames in the recording."""
-    for number, sample in enumerate(opened.samples, opened.start):
-        yield dataclasses.replace(sample, number=number)
 
 
 def without_depth(samples: Iterable[Sample]) -> Iterator[Sample]:
