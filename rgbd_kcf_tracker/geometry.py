@@ -106,7 +106,8 @@ class Box:
     def iou(self, other: Box) -> float:
         """Intersection over union, 0 to 1."""
         common = self.intersection(other)
-        return common / (self.area + other.area - common)
+        union = self.area + other.area - common
+        return common / union if union > 0 else 0.0
 
     def clipped(self, width: int, height: int) -> Box | None:
         """The part inside a ``width`` x ``height`` image, or None where no part is inside."""
@@ -179,7 +180,10 @@ class Intrinsics:
         return cls(focal, focal, (width - 1) / 2, (height - 1) / 2)
 
     def project(self, x: float, y: float, z: float) -> tuple[float, float]:
-        """Pixel of a point in metres, ``z > 0``."""
+        """Pixel of a point in metres, ``z > 0``.
+
+        Far aside, where a lens shows nothing, its model may fold back into the picture.
+        """
         across, down = x / z, y / z
         if self.lens is not None:
             across, down = (float(v) for v in self.lens.bent([(across, down)])[0])

@@ -60,6 +60,8 @@ class Lens:
     def bent(self, points: npt.ArrayLike) -> Points:
         """Where the lens shows points ``(n, 2)`` of the plane one metre ahead."""
         points = np.asarray(points, np.float64)
+        if not len(points):
+            return points.reshape(0, 2)
         if self.fisheye:
             radius = np.maximum(np.hypot(points[:, 0], points[:, 1]), 1e-12)
             angle = np.arctan(radius)
@@ -76,6 +78,8 @@ class Lens:
     def straightened(self, points: npt.ArrayLike) -> Points:
         """The points ``(n, 2)`` that the lens shows at these; NaN where it shows none there."""
         points = np.asarray(points, np.float64)
+        if not len(points):
+            return points.reshape(0, 2)
         found = self._guessed(points)
         with np.errstate(all='ignore'):
             for _ in range(STEPS):

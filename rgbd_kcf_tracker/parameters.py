@@ -127,7 +127,10 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
         ParameterError: for the wrong type, a number out of range, or a string that is no choice.
     """
     if info.type is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
+        try:
+            value = float(value)
+        except OverflowError:
+            value = math.inf
     if type(value) is not info.type:
         raise ParameterError(f'parameter {info.name} is {value!r}: it must be {_kind_text(info)}')
     if isinstance(value, float) and not math.isfinite(value):

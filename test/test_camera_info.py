@@ -395,3 +395,9 @@ def test_a_lens_of_wrong_numbers_is_refused() -> None:
     for coefficients in ((), (1.0,), (0.0, 0.0, 0.0, float('inf'))):
         with pytest.raises(ParameterError):
             Lens(coefficients)
+
+
+@pytest.mark.parametrize('lens', [Lens((-0.2, 0.05, 0, 0, 0)), Lens((0.1, 0, 0, 0), fisheye=True)])
+def test_no_points_are_bent_to_no_points(lens: Lens) -> None:
+    assert lens.bent(np.zeros((0, 2))).shape == (0, 2)
+    assert lens.straightened(np.zeros((0, 2))).shape == (0, 2)

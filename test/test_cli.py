@@ -650,3 +650,25 @@ def test_real_recordings_give_the_same_boxes_from_folder_and_bag(
         assert main(['track', str(path), '--output', output, *options]) == 0
     assert (tmp_path / '0.csv').read_text() == (tmp_path / '1.csv').read_text()
     assert 'tracking' in (tmp_path / '0.csv').read_text()
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        ['evaluate', 'sim:normal', '--size', '\u00b2x3'],
+        ['evaluate', 'sim:normal', '--size', f'{"9" * 5000}x540'],
+        ['evaluate', 'sim:normal', '--eao-lengths', '\u00b2-3'],
+        ['simulate', 'x.mcap', '--size', f'{"9" * 5000}x540'],
+    ],
+)
+def test_digits_that_are_no_number_are_refused(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = ['--report', str(tmp_path / 'r')] if words[0] == 'evaluate' else []
+    assert main([*words, *report]) == 2
+    assert words[-2] in capsys.readouterr().err
+
+
+def test_behind_two_dashes_nothing_is_an_option(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['info', '--', '-5.mcap']) == 2
+    assert '-5.mcap does not exist' in capsys.readouterr().err

@@ -32,6 +32,7 @@ from rgbd_kcf_tracker.view.explain.moments import explain_depth
 from rgbd_kcf_tracker.view.explain.page import Chapter, equation, write_page
 from rgbd_kcf_tracker.view.explain.picture import Picture, show_mesh
 from rgbd_kcf_tracker.view.sources import SimulatedRecording, first_box
+from rgbd_kcf_tracker.view.watch import Call
 
 ASKED = 8
 SIZE = (480, 270)
@@ -338,3 +339,11 @@ def test_command_explains_a_recording(tmp_path: Path, capsys: pytest.CaptureFixt
     assert main([*command, '--variants', 'kcf', '--overwrite']) == 2
     assert 'holds holiday.png, which we did not write' in capsys.readouterr().err
     assert (out / 'holiday.png').exists()
+
+
+def test_the_patch_that_is_drawn_is_the_one_that_was_compared() -> None:
+    """In a frame in which the target was looked for twice the box of the first was drawn."""
+    images = [np.full((2, 2), value, np.float32) for value in (1.0, np.nan, 3.0, np.nan)]
+    calls = [Call('cut', {'n': n}, {}, image) for n, image in enumerate(images)]
+    assert [depth_pictures.that_gave(calls, image).given['n'] for image in images] == [0, 3, 2, 3]
+    assert depth_pictures.that_gave(calls, np.zeros((2, 2))).given['n'] == 0

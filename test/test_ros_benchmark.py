@@ -66,3 +66,14 @@ def test_figures_of_an_earlier_run_are_kept(
     with pytest.raises(SystemExit, match='2'):
         command(['--output', str(tmp_path / 'nowhere' / 'a.json')])
     assert 'nowhere' in capsys.readouterr().err
+
+
+def test_a_soak_that_cannot_go_on_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise RuntimeError('the tracker stopped after 3 answers')
+
+    monkeypatch.setattr(soak, 'run', stopped)
+    assert soak.main(['--frames', '10']) == 2
+    assert 'stopped after 3 answers' in capsys.readouterr().err

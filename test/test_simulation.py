@@ -292,6 +292,25 @@ def test_missing_depth_is_missing_on_the_target_only() -> None:
         assert np.isfinite(depth[5:100, 5:100]).mean() > 0.9
 
 
+def test_depth_that_is_shifted_ends_at_the_side_that_it_leaves() -> None:
+    """What left the picture at one side came in again at the other."""
+    motion = Motion([(0, -1.0, 2.0), (1, 1.0, 2.0)], corner_s=0, channels={'lift': [(0, 0.7)]})
+    actor = ball(np.random.default_rng(0), motion, 0.3)
+    for shift in ((6, 0), (-6, 0), (0, 5), (0, -5)):
+        options = SensorOptions(0, 0, 0, 0, shift=shift)
+        world = World(wall(4.0), [actor], CameraMotion(1.0, 0.0), 1.0, options)
+        depth = record(world)[0].frame.depth
+        assert depth is not None
+        right, down = shift
+        gone = np.zeros(depth.shape, bool)
+        gone[:, :right] |= right > 0
+        gone[:, right:] |= right < 0
+        gone[:down] |= down > 0
+        gone[down:] |= down < 0
+        assert np.isnan(depth[gone]).all()
+        assert np.isfinite(depth[~gone]).any()
+
+
 def test_late_and_shifted_depth_lie_beside_the_colour() -> None:
     motion = Motion([(0, -1.0, 2.0), (1, 1.0, 2.0)], corner_s=0, channels={'lift': [(0, 0.7)]})
     actor = ball(np.random.default_rng(0), motion, 0.3)

@@ -280,3 +280,10 @@ def test_two_who_block_a_doorway_squeeze_through() -> None:
     one, other = rehearse(walkers, plan, 20.0)
     assert one[0].motion.stance(19.9).z == pytest.approx(5, abs=0.15)
     assert other[0].motion.stance(19.9).z == pytest.approx(1, abs=0.15)
+
+
+def test_nobody_flies_in_when_he_comes_back() -> None:
+    """The truth had 280 m/s in the frame in which a visit begins."""
+    scene = simulate('comers', seed=2, rate_hz=10.0)
+    speeds = [float(np.linalg.norm(scene.velocity(index))) for index in range(len(scene))]
+    assert 0.5 < max(speeds) < 3.0

@@ -600,3 +600,10 @@ def test_a_target_is_kept_in_the_world_by_the_poses_of_a_moving_camera():
         assert track.box is None
         predicted.append(track.predicted)
     assert predicted[1][0] - predicted[0][0] == pytest.approx(-0.3, abs=0.1)
+
+
+def test_numbers_beyond_floats_are_refused_and_boxes_without_an_area_overlap_nothing():
+    with pytest.raises(ParameterError, match='jump'):
+        MetricParameters().replace(jump=10**400)
+    least = Box(0, 0, 1e-170, 1e-170)
+    assert least.iou(least) == 0.0

@@ -114,14 +114,17 @@ def _demo(options: argparse.Namespace) -> None:
 
 
 def _simulate(options: argparse.Namespace, bag: Path) -> Truth:
+    from rgbd_kcf_tracker.cli.common import parse_size
+    from rgbd_kcf_tracker.errors import ParameterError
     from rgbd_kcf_tracker.recordings import KINECT2_QHD, BagWriter
     from rgbd_kcf_tracker.simulation import simulate
 
-    width, _, height = options.size.partition('x')
-    if not (width.isdigit() and height.isdigit()):
-        raise DemoError(f'--size is {options.size!r}: give WIDTHxHEIGHT, as in 960x540')
+    try:
+        width, height = parse_size(options.size)
+    except ParameterError as error:
+        raise DemoError(str(error)) from None
     sequence = simulate(
-        options.scenario, options.seed, options.rate, options.seconds, (int(width), int(height))
+        options.scenario, options.seed, options.rate, options.seconds, (width, height)
     )
     truth = Truth([], [], [])
     with BagWriter(bag, KINECT2_QHD, overwrite=True) as writer:

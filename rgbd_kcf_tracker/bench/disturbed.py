@@ -67,7 +67,8 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
         assert frame.depth is not None
         color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
         noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
-        write_image(out / colors.name / f'{path.stem}.png', np.clip(color, 0, 255).astype(np.uint8))
+        levels = np.clip(np.rint(color), 0, 255).astype(np.uint8)
+        write_image(out / colors.name / f'{path.stem}.png', levels)
         write_image(out / 'depth' / f'{path.stem}.png', millimetres(frame.depth + noise))
     return len(frames)
 

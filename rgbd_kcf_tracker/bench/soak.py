@@ -102,6 +102,8 @@ def run(frames: int, size: str, variant: str) -> Soak:
     arrived = np.array([came for _, came, _ in listener.arrivals], dtype=np.int64)
     quarter = max(len(arrived) // 4, 2)
     memory = [mb for done, _, mb in samples if done >= SETTLED * frames]
+    if not memory or len(arrived) < 2:
+        raise RuntimeError(f'only {len(arrived)} of {frames} pairs were answered')
     return Soak(
         sent=frames,
         answered=len(arrived),
@@ -133,7 +135,11 @@ def main(args: list[str] | None = None) -> int:
         check_output(options)
     except RgbdKcfError as error:
         parser.error(str(error))
-    soak = run(options.frames, options.size, options.variant)
+    try:
+        soak = run(options.frames, options.size, options.variant)
+    except RuntimeError as error:
+        print(f'{parser.prog}: {error}', file=sys.stderr)
+        return 2
     print(
         f'{soak.answered} of {soak.sent} pairs answered, {soak.boxes} with a box, in '
         f'{soak.seconds:.0f} s\n'

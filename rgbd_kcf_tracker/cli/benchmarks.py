@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rgbd_kcf_tracker.cli.common import add_topic_options, escaped, parse_intrinsics
+from rgbd_kcf_tracker.cli.common import add_topic_options, escaped, parse_intrinsics, parse_size
 from rgbd_kcf_tracker.cli.interrupts import EXIT_INTERRUPTED, interrupts
 from rgbd_kcf_tracker.cli.workers import (
     EXIT_FAILURES,
@@ -94,20 +94,13 @@ def data_options(args: argparse.Namespace, everyone: bool = False) -> DatasetOpt
         scenarios=tuple(words(args.scenarios or '')),
         rate_hz=args.rate,
         duration_s=args.duration,
-        size=_size(args.size),
+        size=parse_size(args.size),
         names=tuple(words(args.sequences or '')),
         everyone=everyone,
         color_topic=args.color_topic,
         depth_topic=args.depth_topic,
         info_topic=args.info_topic,
     )
-
-
-def _size(text: str) -> tuple[int, int]:
-    width, by, height = text.lower().partition('x')
-    if not by or not width.isdigit() or not height.isdigit():
-        raise ParameterError(f'--size {text!r}: give WIDTHxHEIGHT, such as 960x540')
-    return int(width), int(height)
 
 
 def run_options(

@@ -201,6 +201,18 @@ def parse_box(text: str) -> Box:
     return Box(*numbers)
 
 
+def parse_size(text: str) -> tuple[int, int]:
+    """``960x540`` as width and height.
+
+    Raises:
+        ParameterError: for anything else.
+    """
+    found = re.fullmatch(r'\s*([0-9]{1,6})\s*[xX]\s*([0-9]{1,6})\s*', text)
+    if found is None:
+        raise ParameterError(f'--size is {text[:60]!r}: give WIDTHxHEIGHT, such as 960x540')
+    return int(found[1]), int(found[2])
+
+
 def parse_intrinsics(text: str) -> Intrinsics:
     """``FX,FY,CX,CY`` as intrinsics.
 

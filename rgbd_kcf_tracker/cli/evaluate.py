@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -343,7 +344,7 @@ def _overrides(items: Sequence[str], variants: Sequence[str]) -> dict[str, dict[
 def _lengths(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
-    low, dash, high = text.partition('-')
-    if not (dash and low.isdigit() and high.isdigit() and 0 < int(low) <= int(high)):
-        raise ParameterError(f'--eao-lengths {text!r}: give LOW-HIGH, such as 108-371')
-    return int(low), int(high)
+    found = re.fullmatch(r'([0-9]{1,9})-([0-9]{1,9})', text)
+    if found is None or not 0 < int(found[1]) <= int(found[2]):
+        raise ParameterError(f'--eao-lengths {text[:60]!r}: give LOW-HIGH, such as 108-371')
+    return int(found[1]), int(found[2])

@@ -163,7 +163,13 @@ def _joined(arguments: list[str]) -> list[str]:
     joined: list[str] = []
     for word in arguments:
         number = word[:1] == '-' and word[1:2] in tuple('.0123456789')
-        if number and joined and joined[-1].startswith('--') and '=' not in joined[-1]:
+        if (
+            number
+            and joined
+            and '--' not in joined  # behind which nothing is an option
+            and joined[-1].startswith('--')
+            and '=' not in joined[-1]
+        ):
             joined[-1] += f'={word}'
         else:
             joined.append(word)

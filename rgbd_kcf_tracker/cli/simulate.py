@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rgbd_kcf_tracker.cli.common import add_overwrite_option, escaped, progress
+from rgbd_kcf_tracker.cli.common import add_overwrite_option, escaped, parse_size, progress
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
     if not 1 <= args.count <= most:
         of = f' of {len(names)} scenarios' if len(names) > 1 else ''
         raise ParameterError(f'--count is {args.count}: give 1 to {most}{of}')
-    size = _parse_size(args.size)
+    size = parse_size(args.size)
     for name in names:  # find every mistake before anything is written
         check_request(name, args.seed, args.rate, args.duration, size)
     jobs = [(name, seed) for name in names for seed in range(args.seed, args.seed + args.count)]
@@ -194,13 +194,6 @@ def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list
     named = {path.name: path for path in found}
     check_outputs(named, overwrite=args.overwrite, folders=() if suffix else named)
     return found
-
-
-def _parse_size(text: str) -> tuple[int, int]:
-    width, cross, height = text.lower().partition('x')
-    if not (cross and width.strip().isdecimal() and height.strip().isdecimal()):
-        raise ParameterError(f'--size is {text!r}: give WIDTHxHEIGHT, such as 960x540')
-    return int(width), int(height)
 
 
 def _record(

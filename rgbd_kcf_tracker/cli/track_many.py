@@ -59,7 +59,7 @@ _DONE = '.done'
 _STATES = ('tracking', 'occluded', 'lost')
 _OPTIONS = (
     'init', 'all', 'variant', 'param', 'start', 'end', 'color_topic', 'depth_topic', 'info_topic',
-    'tolerance', 'fps', 'intrinsics', 'rectified', 'max_pixels', 'extrinsics',
+    'tolerance', 'fps', 'intrinsics', 'rectified', 'max_pixels',
 )  # fmt: skip
 """Options that decide what comes out of a recording, as far as this command has them."""
 

@@ -23,6 +23,9 @@ from rgbd_kcf_tracker.simulation.world import Viewpoint
 Window = tuple[int, int, int, int]
 _DOWN = np.array([0.0, 1.0, 0.0])
 
+MOMENT = 0.01
+"""Seconds to either side over which a velocity is taken: the step of the tabulated motions."""
+
 
 @dataclass(frozen=True)
 class PersonActor:
@@ -72,7 +75,16 @@ class VisitorActor:
 
     def centre(self, t: float) -> Vector:
         """See `Actor`; while away, where they were last or will be first."""
+        return self._centre(self._motion(t), t)
+
+    def velocity(self, t: float) -> Vector:
+        """Metres per second in the room: between two visits nobody walks."""
         motion = self._motion(t)
+        there = self._centre(motion, t + MOMENT) - self._centre(motion, t - MOMENT)
+        moved: Vector = there / (2 * MOMENT)
+        return moved
+
+    def _centre(self, motion: Motion, t: float) -> Vector:
         low = 1 - 0.3 * motion.value('sit', t)
         stance = motion.stance(t)
         back = 0.2 * stance.sit * self.person.height

@@ -115,7 +115,8 @@ def _cell(sequence: SimulatedSequence, tile: int) -> Image:
         cv2.putText(pictures[-1], 'no depth', (tile // 3, size[1] // 2), cv2.FONT_HERSHEY_SIMPLEX,
                     0.45, (200, 200, 200), 1, cv2.LINE_AA)  # fmt: skip
     label = np.full((_LABEL, 3 * tile, 3), 255, np.uint8)
-    at, length = moment / sequence.rate_hz, len(sequence) / sequence.rate_hz
+    begun, ended = sequence.stamp_ns(0), sequence.stamp_ns(len(sequence) - 1)
+    at, length = (sequence.stamp_ns(moment) - begun) * 1e-9, (ended - begun) * 1e-9
     text = f'{sequence.scenario}: start, and {at:.1f} s of {length:.1f} s'
     cv2.putText(label, text, (2, 14), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (30, 30, 30), 1, cv2.LINE_AA)
     return np.concatenate([label, np.concatenate(pictures, axis=1)])

@@ -89,7 +89,7 @@ def _clip_near(points: Vector) -> Vector:
 
 def draw_face(
     f: Face, camera: Intrinsics, color: npt.NDArray[np.uint8], depth: npt.NDArray[np.float32],
-    owner: npt.NDArray[np.uint8] | None = None, label: int = 0, origin: tuple[int, int] = (0, 0),
+    origin: tuple[int, int] = (0, 0),
 ) -> None:  # fmt: skip
     """Draw a face given in the camera's frame into colour and depth where it is nearest.
 
@@ -98,8 +98,6 @@ def draw_face(
         camera: pinhole camera.
         color: ``(h, w, 3)`` picture or window of it.
         depth: ``(h, w)`` metres, inf where empty.
-        owner: ``(h, w)`` labels to write to, if any.
-        label: what to write there.
         origin: picture coordinates of the window's first pixel.
     """
     quad = np.array(
@@ -151,8 +149,6 @@ def draw_face(
     select = hit.view(np.uint8)
     cv2.copyTo(picture, select, color[window])
     np.copyto(depth[window], z, where=hit)
-    if owner is not None:
-        owner[window][hit] = label
 
 
 @dataclass

@@ -175,5 +175,8 @@ class Sensor:
         full = cv2.resize(z, (self.width, self.height), interpolation=cv2.INTER_NEAREST)
         if self.options.shift != (0, 0):
             right, down = self.options.shift
-            full = np.roll(full, (down, right), axis=(0, 1))
+            moved = np.array([[1, 0, right], [0, 1, down]], np.float64)
+            full = cv2.warpAffine(
+                full, moved, (self.width, self.height), flags=cv2.INTER_NEAREST, borderValue=np.nan
+            )
         return np.ascontiguousarray(full, np.float32)

@@ -13,14 +13,13 @@ import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.simulation.actors import MOMENT, VisitorActor
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
 from rgbd_kcf_tracker.simulation.sensor import Sensor
 from rgbd_kcf_tracker.simulation.solids import Vector
 from rgbd_kcf_tracker.simulation.world import World
 
 EPOCH_NS = 1_700_000_000_000_000_000
-_MOMENT = 0.01
-"""Seconds to either side over which a velocity is taken: the step of the tabulated motions."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +143,10 @@ class SimulatedSequence:
         """The target's over the ground at one frame, metres per second in the optical frame."""
         t = self._offsets_ns[index] * 1e-9
         target = self.scene.actors[self.scene.people[0]]
-        moved = (target.centre(t + _MOMENT) - target.centre(t - _MOMENT)) / (2 * _MOMENT)
+        if isinstance(target, VisitorActor):
+            moved = target.velocity(t)
+        else:
+            moved = (target.centre(t + MOMENT) - target.centre(t - MOMENT)) / (2 * MOMENT)
         rotation, _ = self.scene.camera.at(t)
         x, y, z = (float(v) for v in rotation @ moved)
         return x, y, z

@@ -79,7 +79,7 @@ def load(path: Path, truth_path: Path, fps: float) -> Opened:
     annotated = RANGES.get(path.name.lower())
     if annotated is not None and len(boxes) != len(images):
         first, last = annotated
-        images = tuple(p for p in images if p.stem.isdigit() and first <= int(p.stem) <= last)
+        images = tuple(p for p in images if p.stem.isdecimal() and first <= int(p.stem) <= last)
         if len(boxes) != len(images) and len(boxes) >= last:  # annotated from the first image on
             boxes = boxes[first - 1 : last]
     check_lengths(truth_path, len(boxes), images, folder)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.evaluation import plot_style
 from rgbd_kcf_tracker.geometry import Box
@@ -83,12 +85,18 @@ def _compared(moment: Moment | None) -> Call | None:
     return calls[-1] if calls else None
 
 
+def that_gave(calls: Sequence[Call], image: npt.NDArray[Any]) -> Call:
+    """The last of some calls that returned an image; the first of all where none did."""
+    same = (call for call in calls[::-1] if np.array_equal(call.value, image, equal_nan=True))
+    return next(same, calls[0])
+
+
 def _patches(moment: Moment, call: Call) -> Picture:
     depth = moment.frame.depth
     assert depth is not None
     remembered, patch = call.given['self']['_patch'], call.given['patch']
-    box = moment.of(_PATCH)[0].given['box']
-    share = moment.of(_PATCH)[0].given['share']
+    cut = that_gave(moment.of(_PATCH), patch)
+    box, share = cut.given['box'], cut.given['share']
     low, high = _range(remembered, patch)
     figure = plot_style.figure(9.5, 6.4)
     axes = figure.subplots(2, 2, height_ratios=(1, 1.1))
