@@ -1873,6 +1873,25 @@ def test_of_whom_depth_reads_no_more_the_room_beside_him_is_not_how_he_looks(
     assert view_in(gone, stride, by_look, one.z) is None
 
 
+@pytest.mark.parametrize('x', [None, 0.45, 1.4])
+def test_of_whom_another_hides_a_part_not_all_was_drawn(
+    x: float | None, monkeypatch: pytest.MonkeyPatch
+):
+    """What showed of him behind another was all that he looked like: he was never known again."""
+    own = np.ones((ROWS, COLS), np.float32)
+    monkeypatch.setattr(ByLook, 'own', lambda self, image: own[: len(image), : image.shape[1]])
+    reader, one = SceneReader(COLS, 0.04, 0.03, 0.0), Someone(0.2, 2.6)
+    beside = [] if x is None else [Someone(x, 2.0, GREEN, GREY)]
+    for i in range(4):
+        reader.read(picture([], 0.1 * i), 0.1)
+    frame = picture([one, *beside], 0.4, unread=one)
+    scene = reader.read(frame, 0.1)
+    assert scene is not None
+    drawn = Drawn.of(scene, one.box, ByLook(frame, one.box, MetricParameters()), 0.4)
+    assert drawn is not None
+    assert drawn.whole == (x != 0.45)
+
+
 def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
     monkeypatch: pytest.MonkeyPatch,
 ):

@@ -23,6 +23,9 @@ NARROW, BROAD = 6.0, 1.8
 walk are: others are about things, or parts of somebody, whose colours lie elsewhere."""
 OWN = 0.5
 """Probability from which a pixel's colour is rather his than that of what is around him."""
+ABOUT, TOUCHED = 1.1, 0.05
+"""Size of a box with a rim in which others may touch who is in it, and the share of it from which
+somebody before him is read there."""
 UNLIKE = -1.0
 """Log-odds below which what a look has found, where depth does not tell, is something else: so are
 nine of ten boxes on walls and doors beyond depth's reach, and hardly any on people
@@ -76,7 +79,8 @@ class Drawn:
     Attributes:
         gallery: how he looks.
         place: ``(2,)`` metres across and along the floor, were he of mean height.
-        whole: whether the box ends where he does, and not where depth's view does.
+        whole: whether the box ends where he does, and not where depth's view does or another
+            stands before him.
     """
 
     gallery: Gallery
@@ -93,7 +97,10 @@ class Drawn:
         gallery.learn(seen, time)
         view, b = scene.view, box.over(scene.view.step)
         middle = view.metres(b.cx, b.cy, STATURE * view.intrinsics.fy / b.height)
-        return cls(gallery, scene.axes @ np.array(middle), not scene.ends(box).any)
+        # What stands before him is read, and hides a part of him.
+        about = scene.before[part_in(view.shape, b.scaled(ABOUT))]
+        alone = np.count_nonzero(about) < TOUCHED * about.size
+        return cls(gallery, scene.axes @ np.array(middle), bool(alone) and not scene.ends(box).any)
 
     def unlike(self, view: View) -> bool:
         """Whether a figure does not look as he does: said only if all of him was drawn."""
