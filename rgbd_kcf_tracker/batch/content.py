@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.files import walk
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 MISSING = '-'
@@ -59,13 +60,7 @@ _Entry = tuple[str, Path | None, os.stat_result | None]
 def _files(path: Path) -> Iterator[_Entry]:
     """Name within the digest, place and state of a file, or of the files in a folder."""
     if path.is_dir():
-        seen: set[tuple[int, int]] = set()
-        for folder, subfolders, names in os.walk(path, followlinks=True):
-            state = os.stat(folder)
-            if (state.st_dev, state.st_ino) in seen:  # links may lead in circles
-                subfolders[:] = []
-                continue
-            seen.add((state.st_dev, state.st_ino))
+        for folder, subfolders, names in walk(path):
             subfolders[:] = sorted(n for n in subfolders if not n.startswith('.'))
             for name in sorted(n for n in names if not n.startswith('.')):
                 file = Path(folder, name)

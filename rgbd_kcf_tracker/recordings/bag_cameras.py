@@ -76,6 +76,15 @@ class BagCameras:
                 f'{self._topic.name}: the camera changes, at frame {number} from fx={was.fx:g} '
                 f'fy={was.fy:g} to fx={now.fx:g} fy={now.fy:g}: each frame has its own'
             )
+        return self._fitting(camera, size)
+
+    def first_for(self, size: tuple[int, int] | None) -> Intrinsics | None:
+        """That of the first frames, if it is for pictures of that size; None where any will do."""
+        if self.first is None or size is None:
+            return None if self.first is None else self.first.intrinsics
+        return self._fitting(self.first, size)
+
+    def _fitting(self, camera: Camera, size: tuple[int, int]) -> Intrinsics | None:
         misfit = camera.misfit(*size)
         if misfit:
             self._warn(f'{self._topic.name} {misfit}: left out')

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.bag_cameras import BagCameras
 from rgbd_kcf_tracker.recordings.bag_pairing import pair_topics
 from rgbd_kcf_tracker.recordings.bag_topics import (
@@ -70,7 +70,10 @@ class BagRecording(Closing):
             self._pairs, told = pair_topics(self._color, self._depth, options.tolerance_s)
             self.warnings += told
             self._cameras = None if options.intrinsics else self._open_cameras(options.rectified)
-            self.intrinsics = options.intrinsics or self._first_intrinsics()
+            self.intrinsics = options.intrinsics
+            if self._cameras is not None:
+                size = next(i.size for i in self._images if i.name == self.topics.color)
+                self.intrinsics = self._cameras.first_for(size)
             self.groundtruth = self._read_truth(TRUTH_TOPICS[0])
             self.groundtruth_body = known(self._read_truth(TRUTH_TOPICS[1]))
         except BaseException:
@@ -189,18 +192,6 @@ class BagRecording(Closing):
             return None
         topic, pictures = self.bag.topics[self.topics.info], base_name(self.topics.color)
         return BagCameras(self.bag, topic, pictures, rectified, self._warn)
-
-    def _first_intrinsics(self) -> Intrinsics | None:
-        """Of the first frames, unless they are of another size."""
-        first = None if self._cameras is None else self._cameras.first
-        if first is None:
-            return None
-        size = next(i.size for i in self._images if i.name == self.topics.color)
-        misfit = '' if size is None else first.misfit(*size)
-        if misfit:
-            self._warn(f'{self.topics.info} {misfit}: left out')
-            return None
-        return first.intrinsics
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         topic = self.bag.topics.get(name)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
 from io import FileIO
 from pathlib import Path
 from typing import Any
@@ -158,3 +159,26 @@ def _stat(path: Path) -> os.stat_result:
 def _require_file(path: Path, mode: int) -> None:
     if not stat.S_ISREG(mode):
         raise RecordingError(f'{path} is {kind_of(mode)}: it must be a file')
+
+
+def walk(path: str | os.PathLike[str]) -> Iterator[tuple[str, list[str], list[str]]]:
+    """As :func:`os.walk`, but through links too, and once into each folder: links lead in circles.
+
+    What is taken out of the second list is not entered.
+    """
+    seen: set[tuple[int, int]] = set()
+
+    def is_new(folder: str) -> bool:
+        try:
+            state = os.stat(folder)
+        except OSError:  # it went meanwhile
+            return False
+        identity = state.st_dev, state.st_ino
+        new = identity not in seen
+        seen.add(identity)
+        return new
+
+    is_new(os.fspath(path))
+    for folder, subfolders, names in os.walk(path, followlinks=True):
+        yield folder, subfolders, names
+        subfolders[:] = [name for name in subfolders if is_new(os.path.join(folder, name))]

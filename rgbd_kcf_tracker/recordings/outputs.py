@@ -29,7 +29,7 @@ from types import TracebackType
 from typing import BinaryIO, TypeVar
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.files import kind_of, why
+from rgbd_kcf_tracker.recordings.files import kind_of, walk, why
 
 T = TypeVar('T')
 W = TypeVar('W', bound='FrameWriter')
@@ -543,8 +543,7 @@ def _links_in(folder: Path, but: set[str]) -> Iterator[Path]:
 
     What lies at one of the places ``but`` is left out.
     """
-    seen: set[Identity] = set()
-    for place, subfolders, names in os.walk(folder, followlinks=True):
+    for place, subfolders, names in walk(folder):
         inside = [name for name in subfolders if _own_place(os.path.join(place, name)) not in but]
         for path in (Path(place, name) for name in (*inside, *names)):
             with contextlib.suppress(OSError):  # it went meanwhile
@@ -554,17 +553,7 @@ def _links_in(folder: Path, but: set[str]) -> Iterator[Path]:
                 )
                 if linked and _own_place(path) not in but:
                     yield path
-        subfolders[:] = [name for name in inside if _is_new(os.path.join(place, name), seen)]
-
-
-def _is_new(folder: str, seen: set[Identity]) -> bool:
-    """Whether a folder was not seen yet: links may lead in circles. Now it was."""
-    with contextlib.suppress(OSError):
-        identity = _identity(os.stat(folder))
-        new = identity not in seen
-        seen.add(identity)
-        return new
-    return False
+        subfolders[:] = inside
 
 
 def _read_among(outputs: Sequence[os.stat_result], sources: Sequence[str]) -> set[Identity]:
@@ -581,9 +570,7 @@ def _identities(path: str, files: bool) -> Iterator[Identity]:
             yield _identity(os.stat(name))
     if not files:
         return
-    seen: set[Identity] = set()
-    for folder, subfolders, names in os.walk(path, followlinks=True):
+    for folder, _, names in walk(path):
         for name in names:
             with contextlib.suppress(OSError):
                 yield _identity(os.stat(os.path.join(folder, name)))
-        subfolders[:] = [name for name in subfolders if _is_new(os.path.join(folder, name), seen)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,12 @@ _DOWN = np.array([0.0, 1.0, 0.0])
 
 MOMENT = 0.01
 """Seconds to either side over which a velocity is taken: the step of the tabulated motions."""
+
+
+def velocity_of(centre: Callable[[float], Vector], t: float) -> Vector:
+    """Metres per second, ``(3,)``, of what is at ``centre`` at each time."""
+    moved: Vector = (centre(t + MOMENT) - centre(t - MOMENT)) / (2 * MOMENT)
+    return moved
 
 
 @dataclass(frozen=True)
@@ -79,10 +86,7 @@ class VisitorActor:
 
     def velocity(self, t: float) -> Vector:
         """Metres per second in the room: between two visits nobody walks."""
-        motion = self._motion(t)
-        there = self._centre(motion, t + MOMENT) - self._centre(motion, t - MOMENT)
-        moved: Vector = there / (2 * MOMENT)
-        return moved
+        return velocity_of(partial(self._centre, self._motion(t)), t)
 
     def _centre(self, motion: Motion, t: float) -> Vector:
         low = 1 - 0.3 * motion.value('sit', t)

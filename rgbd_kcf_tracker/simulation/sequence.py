@@ -13,7 +13,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.simulation.actors import MOMENT, VisitorActor
+from rgbd_kcf_tracker.simulation.actors import VisitorActor, velocity_of
 from rgbd_kcf_tracker.simulation.picture import Backdrop, Picture, Truth
 from rgbd_kcf_tracker.simulation.sensor import Sensor
 from rgbd_kcf_tracker.simulation.solids import Vector
@@ -146,7 +146,7 @@ class SimulatedSequence:
         if isinstance(target, VisitorActor):
             moved = target.velocity(t)
         else:
-            moved = (target.centre(t + MOMENT) - target.centre(t - MOMENT)) / (2 * MOMENT)
+            moved = velocity_of(target.centre, t)
         rotation, _ = self.scene.camera.at(t)
         x, y, z = (float(v) for v in rotation @ moved)
         return x, y, z
