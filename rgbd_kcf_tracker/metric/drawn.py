@@ -29,7 +29,7 @@ somebody before him is read there."""
 UNLIKE = -1.0
 """Log-odds below which what a look has found, where depth does not tell, is something else: so are
 nine of ten boxes on walls and doors beyond depth's reach, and hardly any on people
-(docs/metric.md)."""
+(docs/experiments.md)."""
 
 
 def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) -> View | None:
@@ -39,7 +39,7 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
 
     Looks are counted from the head down in metres, so that they can be compared with those of
     whoever depth shows: of single views of real people that is nearly as telling as their outlines
-    in depth (docs/metric.md).
+    in depth (docs/experiments.md).
 
     Args:
         scene: of the frame.

@@ -58,7 +58,7 @@ RECOGNISED_SIGHTINGS, RECOGNISED_AFTER, RECOGNISED_ODDS = 3, 0.5, 1.0
 """Sightings of a returning target, and seconds of them, after which it is the target for good, and
 the mean log-odds of its look that it takes: at 1 Hz three seconds, at 30 Hz half a second, as
 sightings in a row show the same. With 2 instead of 1 it was 0.8 worse on the disturbed copies
-(docs/metric.md)."""
+(docs/experiments.md)."""
 MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or

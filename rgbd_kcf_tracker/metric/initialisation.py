@@ -29,7 +29,7 @@ LOCK_IOU = 0.5
 which a box counts as right in the benchmarks, too (PASCAL VOC)."""
 SAME_OUTLINE = 0.7
 """Overlap of two outlines from which they are of one thing and not of a part of it. At 0.35 a mug
-in a hand became the person, at 0.5 a face the body below it (docs/metric.md)."""
+in a hand became the person, at 0.5 a face the body below it (docs/experiments.md)."""
 PART_IOU, INSIDE = 0.35, 0.9
 """The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
 LEAST_FILL = 0.5

@@ -4,7 +4,7 @@
 """From what is seen of a candidate to the probability that it is the target.
 
 A logistic regression over a dozen measurements. Its weights were fitted to candidates that the
-tracker met in simulated scenes and are checked on real recordings (docs/metric.md tells how to fit
+tracker met in simulated scenes and are checked on real recordings (docs/figures.md tells how to fit
 them again); so the probability is calibrated, and the decision needs no thresholds of its own.
 """
 
@@ -133,7 +133,7 @@ WEIGHTS = np.array(
 """Log-odds that the candidate is the target for each unit of :meth:`Evidence.features`, in their
 order. They come from a logistic regression on proposals that the tracker met on simulated and real
 people, each right or wrong by the truth; ``evaluation.evidence_fit`` fits them again, and
-docs/metric.md says on what these were fitted. Hand-set ones were as good, but not calibrated."""
+docs/figures.md says on what these were fitted. Hand-set ones were as good, but not calibrated."""
 
 SUREST = 30.0
 """Log-odds beyond which nothing is surer: ten to the thirteenth to one, about the last that a

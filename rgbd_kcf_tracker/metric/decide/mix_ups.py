@@ -38,7 +38,8 @@ five sightings, twice :data:`SIGHTINGS`. Later on what was learned since speaks 
 MIXED_UP = 2.0
 """Log-odds (seven to one) from which two were taken for one another, as for a newcomer who is
 somebody known, beyond what their places said against it while they were near. At 3 one of twins was
-lost for a sixth of its scene, and everyone's returns fell from 86.3 to 84.7 % (docs/metric.md)."""
+lost for a sixth of its scene, and everyone's returns fell from 86.3 to 84.7 %
+(docs/experiments.md)."""
 ANOTHER = 3.0
 """Log-odds (20 to 1) from which who came back is none of those who are known, and who goes on where
 somebody was is one who is hidden: another side or another light may show of him."""

@@ -17,7 +17,7 @@ a camera's noise, of about 5 levels."""
 STIRS = 0.05
 """Share of the pixels that have changed from which somebody stirs. Of real people who stand or sit
 9.5 % at the least have changed a second later, of simulated ones 4 %, of furniture 1 % in the
-median (docs/metric.md)."""
+median (docs/experiments.md)."""
 SAME_OUTLINE = 0.7
 """Share of the smaller of two outlines that lies in the other where both are of what stands."""
 NEARER, LEAST = 0.3, 30

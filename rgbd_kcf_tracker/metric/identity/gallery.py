@@ -47,7 +47,7 @@ fewer the rim is taken, too, as they would hardly fill the colours that are told
 STEEPNESS, EVEN, EVEN_PER_VIEW = 20.0, 0.62, 0.03
 """Of the logistic curve from similarity to the log-odds of being the same person, where it is even
 for one view, and by how much more with each doubling of their number (the best of many is more
-alike, whosever they are); fitted on real and simulated people (docs/metric.md)."""
+alike, whosever they are); fitted on real and simulated people (docs/figures.md)."""
 EVEN_GREY = 0.84
 """Where it is even before a camera without colour: there all are more alike by as much. Fitted on
 the same people without their colours, as is the steepness, which comes out the same."""
@@ -59,7 +59,7 @@ ONE_SIDE, ALL_SIDES = 0.7, 4
 and the further views from which all sides are known."""
 WHOLE_AREA, TELLING_AREA, PART = 0.3, 0.1, 0.4
 """Square metres of a view in which all of somebody shows, and from which he is told by what shows
-of him as well as by all (docs/metric.md): a head and shoulders; and the share of that which the
+of him as well as by all (docs/figures.md): a head and shoulders; and the share of that which the
 least part says. Against somebody only all of him says all: what is seen past something has some of
 its colours, and slices that are counted from there."""
 HEIGHT_SIGMA = 0.07
@@ -70,7 +70,7 @@ ANY_HEIGHT = 2.8
 standard deviation of 10 cm, as of adults, the mean over them, ``1 / (2 * sqrt(pi) * 0.1)``."""
 STOOPED = 0.7
 """Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
-1 Hz heights of real people hardly tell who it is at all (docs/metric.md)."""
+1 Hz heights of real people hardly tell who it is at all (docs/figures.md)."""
 SEATED, LOWER = 0.55, 0.05
 """Share of somebody's height from which that is so: on a chair one is three quarters as high as
 when standing, on one's knees or bent over somewhat less (at 0.62 who was half hidden was refused);
@@ -300,7 +300,7 @@ MOST_VIEWS = 14
 """Views of one person: some sides, near and far, in some lights; more bring nothing and cost."""
 NOVEL = 0.9
 """Likeness to the nearest view from which a new one adds nothing. At 0.63 sides are missing, and
-everyone's IDF1 was 3 points lower; with all taken it was the same (docs/metric.md)."""
+everyone's IDF1 was 3 points lower; with all taken it was the same (docs/experiments.md)."""
 HEIGHT_MEMORY = 25
 """Heights of one person that are remembered: some seconds, so that a stoop does not stay."""
 

@@ -24,7 +24,7 @@ depth, and to the side half of what an arm or a half hidden body moves it."""
 WALKING = 0.8
 """Metres a second by which a person's next place is unknown: about half of a walk (1.4 m/s), as who
 walks may stop, and who stands may go. Chosen with the real people at 1 Hz among others
-(docs/metric.md)."""
+(docs/experiments.md)."""
 STEADY = 0.7
 """Share of that for one who has been followed for some frames and was just seen."""
 COAST = 1.2

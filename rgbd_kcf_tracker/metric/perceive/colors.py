@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.light import STRIDE
 
 LIGHTNESS, TINTS = 10, 7
 """Levels of lightness, and of red and blue against green each: with 8 to 14 and 7 to 13 of them
-people are told apart alike (docs/metric.md), and few are fast."""
+people are told apart alike (docs/experiments.md), and few are fast."""
 CODES = LIGHTNESS * TINTS * TINTS
 """Colours that are told apart, which follows from these."""
 

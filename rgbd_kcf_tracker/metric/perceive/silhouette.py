@@ -23,7 +23,7 @@ RING = 2
 seam that often lies between two surfaces."""
 CUT_SHARE = 0.3
 """Share of one side's outline beside which something nearer must lie for that side to be cut. At
-0.21 everyone's MOTA was 1.6 points lower, at 0.42 walks at 1 Hz were (docs/metric.md)."""
+0.21 everyone's MOTA was 1.6 points lower, at 0.42 walks at 1 Hz were (docs/experiments.md)."""
 UPPER = 0.98
 """Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
 _SEAM = np.ones((3, 3), np.uint8)

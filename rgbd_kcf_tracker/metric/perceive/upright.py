@@ -28,7 +28,7 @@ TOP = (1.0, 2.15)
 to a tall one. The backs of chairs reach up to 0.9 m, and their seats look like shoulders."""
 WIDTH = (0.25, 1.0)
 """Metres of one person's width: a chest seen from its side, with an arm before it, to arms half
-spread. Everyone at 1 Hz is a little worse from 0.18 m on (docs/metric.md)."""
+spread. Everyone at 1 Hz is a little worse from 0.18 m on (docs/experiments.md)."""
 GROUP = 2.5
 """Metres of people who touch, at the most."""
 HEAD = (0.03, 0.2)
