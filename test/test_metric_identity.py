@@ -26,6 +26,7 @@ from people_rig import (
     Someone,
     images,
     picture,
+    texture,
 )
 
 from rgbd_kcf_tracker import Box, Frame, create_tracker
@@ -1699,6 +1700,39 @@ def test_a_cupboard_behind_somebody_who_has_no_reading_is_not_he():
     depth[:, round(b.cx) - 9 : round(b.cx) + 9] = np.nan  # nor do his arms show
     scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
     assert surface_of(Crowd().explain(scene, 0.0), b, MetricParameters()) is None
+
+
+@pytest.mark.parametrize('above', [True, False])
+def test_what_shows_through_a_door_and_above_the_box_is_not_whom_it_is_about(above: bool):
+    depth = np.full((ROWS, COLS), 3.0, np.float32)
+    drawn = Box(100, 50, 30, 80)
+    door = depth[25 if above else 50 : 130, 95:135]
+    door[...], door[::3] = 4.5, np.nan  # strips that do not hang together
+    depth[50:130, 119:135] = 2.9  # somebody who is one surface with the wall
+    frame = Frame(texture(0), depth, 0, CAMERA)
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(frame, 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters())
+    assert (seen is None) == above
+
+
+def test_who_touches_a_cupboard_of_his_depth_is_chosen_without_it():
+    """He and it are one surface, nearly twice as wide as what shows of him beside a post."""
+    targets, post = TargetSet('metric'), Box(80, 0, 28, ROWS)
+    for i in range(10):
+        one = Someone(0.0, 3.0 - 0.12 * max(i - 4, 0))
+        color, depth = images([one], post)
+        cupboard = np.s_[31:137, 134:158]
+        before = depth[cupboard] > 3.0
+        color[cupboard][before], depth[cupboard][before] = GREY, 3.0
+        frame = Frame(color, depth, round(1e8 * i), CAMERA)
+        b = one.box
+        shows = Box.from_corners(post.right, b.y, b.right, b.bottom)
+        if i == 0:
+            number = targets.add(frame, Box(shows.x, shows.y, shows.width, ROWS - shows.y))
+            continue
+        track = targets.update(frame)[number]
+        assert track.box is not None
+        assert track.box.iou(shows) > 0.7
 
 
 @pytest.mark.parametrize('own', [False, True])

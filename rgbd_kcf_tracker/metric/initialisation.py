@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -14,12 +15,14 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide.account import SMALL, Account
+from rgbd_kcf_tracker.metric.decide.crowd import beside
 from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
-from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE
+from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE, UPRIGHT
+from rgbd_kcf_tracker.metric.perceive.parting import BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
@@ -47,6 +50,9 @@ NOISE = 3
 LEAST_BESIDE = 0.25
 """How much of who is half hidden a box shows at the least, against the largest that it shows of
 anything no larger than a person: of less there is more between somebody's arms and legs."""
+SOMEBODY_FARTHER = 0.1
+"""Share of the given box that shows somebody farther than what fills most of it, from which that
+may hide whom the box is about: less is seen between somebody's arms and legs."""
 LEAST_TOLD = 0.25
 """Share of the given box's columns that depth reaches from which these tell what it is about: a leg
 and an arm of who stands where the depth image ends."""
@@ -56,6 +62,9 @@ one that shows somebody from which he is meant."""
 CENTRED = 0.125
 """Share of the target's scattered readings in the middle quarter of the box, at the least: half of
 what lies there of readings all over it. Of real and simulated starts 0.19 to 0.52 do."""
+ABOVE, LIKEWISE = 0.1, 0.7
+"""Share of the height of a box in which it is seen whether what the box shows goes on above: less
+than a head; and how densely, against what is in the box, something as far is read there then."""
 MEANT_IOU = 0.15
 """Overlap with a person of a box by which he is meant though it fits nothing: a trunk has 0.18 and
 more, and boxes that are off by a fifth of their size mostly 0.25. Of 400 starts on people as they
@@ -82,7 +91,9 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     if whole is not None:
         return behind or _within(scene, whole, box)
     piece = _piece_of(scene, told)
-    if piece is not None and _found_again(account, piece, parameters):
+    if piece is not None and (
+        _one_of_two(scene, piece, told) or _found_again(account, piece, parameters)
+    ):
         return piece
     return behind or _scattered(scene, told) or _meant(account, box)
 
@@ -176,8 +187,11 @@ def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
     """Whether the middle of a box shows that a silhouette is of what is behind the target.
 
     Mostly it has no reading there then, and next to nothing of the silhouette, or shows more of
-    something large before it: the target may be a part of that, as who touches a wall.
+    something large before it: the target may be a part of that, as who touches a wall. Or it shows
+    through a door and goes on above the box.
     """
+    if _through_an_opening(scene, seen, box):
+        return True
     down, across = box.height / 4, box.width / 4
     inner = Box(box.x + across, box.y + down, 2 * across, 2 * down).over(scene.view.step)
     middle = part_in(scene.view.shape, inner)
@@ -188,6 +202,19 @@ def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
     nearer = scene.standing[middle] & (depth < seen.depth - DEPTH_STEP)
     nearer &= larger_than_anybody(scene.sizes)[scene.surfaces.labels[middle]]
     return bool(np.count_nonzero(nearer) > own)
+
+
+def _through_an_opening(scene: Scene, seen: Silhouette, box: Box) -> bool:
+    """Whether a silhouette between two nearer things goes on above a box, and shows as densely."""
+    if not (seen.cut.left and seen.cut.right):
+        return False
+    rows = scene.view.shape[0]
+    b = box.over(scene.view.step)
+    top = min(max(math.ceil(b.y), 0), rows)
+    band = np.s_[max(top - math.ceil(ABOVE * b.height), 0) : top, seen.cols]
+    z = seen.depth
+    as_far = np.abs(scene.view.depth[band] - z) < DEPTH_STEP + DEPTH_STEP_PER_METRE * z
+    return bool(np.count_nonzero(as_far) > LIKEWISE * seen.mask.mean() * as_far.size > 0)
 
 
 def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
@@ -201,6 +228,23 @@ def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
         return None
     part = _within(scene, scene.silhouette(label), box)
     return part if box_about(scene, part).iou(box) >= LOCK_IOU else None
+
+
+def _one_of_two(scene: Scene, piece: Silhouette, box: Box) -> bool:
+    """Whether what stands beside a piece, as one surface with it, is somebody or something else.
+
+    From the next frame on the two are parted where they stand. Where the box shows somebody farther
+    as well, that one may be meant, half hidden by one of them.
+    """
+    own = piece.in_view(scene.view.shape)
+    whole = scene.silhouette(int(scene.surfaces.labels[own][0]))
+    if whole.width < BROAD or piece.height < UPRIGHT or not beside(scene, whole, piece):
+        return False
+    part = part_in(scene.view.shape, box.over(scene.view.step))
+    labels = scene.surfaces.labels[part]
+    farther = scene.view.depth[part] > piece.depth + DEPTH_STEP
+    farther &= (labels > 0) & ~larger_than_anybody(scene.sizes)[labels] & ~own[part]
+    return bool(np.count_nonzero(farther) < SOMEBODY_FARTHER * farther.size)
 
 
 def _found_again(account: Account, piece: Silhouette, parameters: MetricParameters) -> bool:
@@ -277,7 +321,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     if own < CENTRED * np.count_nonzero(mine):
         return None
     seen = Silhouette.trimmed(scene.view, cols.start, rows.start, mine, scene.rim)
-    if seen is None:
+    if seen is None or _through_an_opening(scene, seen, box):
         return None
     # What little depth there is of a small thing in a hand may be the hand's.
     if seen.width * seen.height < SMALL or box_about(scene, seen).iou(box) < LOCK_IOU:

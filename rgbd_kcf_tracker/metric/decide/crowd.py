@@ -114,12 +114,10 @@ class Crowd:
     def _chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         index = account.figure_of(seen)
         owner = account.owner[index] if index >= 0 else -1
-        beside = (
-            [] if index < 0 else _beside(account.scene, account.sights[index].figure.seen, seen)
-        )
+        rest = [] if index < 0 else beside(account.scene, account.sights[index].figure.seen, seen)
         if owner >= 0:
             person = account.people[owner]
-            if beside and person.first_seen == account.time:
+            if rest and person.first_seen == account.time:
                 other = self._new_at(account, seen, person)
                 if other is not None and not other.chosen:
                     other.chosen = True
@@ -131,7 +129,7 @@ class Crowd:
                 since < person.first_seen and not person.chosen
             ):
                 person.chosen = True
-                self._welcome_beside(account, person, beside)
+                self._welcome_beside(account, person, rest)
                 return person
         for person in account.people:  # what was chosen in this frame and is no figure, once more
             last = person.last if person.seen_at == account.time else None
@@ -143,7 +141,7 @@ class Crowd:
         if index >= 0:
             account.owner[index] = len(account.people) - 1
         self._see(account, len(account.people) - 1, seen, index)
-        self._welcome_beside(account, person, beside)
+        self._welcome_beside(account, person, rest)
         return person
 
     def _new_at(self, account: Account, seen: Silhouette, but: Person) -> Person | None:
@@ -470,7 +468,7 @@ def _is_piece(account: Account, column: int) -> bool:
     )
 
 
-def _beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:
+def beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:
     """Who else a figure holds of which only a part was chosen: what stands on its sides."""
     found = []
     for left, right in ((figure.left, seen.left), (seen.cols.stop, figure.cols.stop)):
