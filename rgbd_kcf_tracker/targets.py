@@ -86,7 +86,7 @@ class TargetSet:
 
         Returns:
             Its id, which no other gets while the set lives. With ``metric`` an id is somebody's:
-            who is followed already keeps it, and has it again after :meth:`remove`.
+            what is followed already keeps it, and a person has it again after :meth:`remove`.
 
         Raises:
             BoxError: where no whole pixel of the box lies inside the frame.

@@ -80,7 +80,8 @@ class Tracker(Protocol):
     def start(self, frame: Frame, box: Box) -> Track:
         """Take the target in ``box`` of ``frame``, forgetting any other.
 
-        Returns the track of this first frame, which is the given box.
+        Returns the track of this first frame: the given box, or, with ``metric``, all of
+        somebody who was drawn by half or badly.
 
         Raises:
             BoxError: where the box lies outside the image; see :func:`require_inside`.

@@ -18,6 +18,7 @@ from rgbd_kcf_tracker.insight import insight_in
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
@@ -607,3 +608,123 @@ def test_numbers_beyond_floats_are_refused_and_boxes_without_an_area_overlap_not
         MetricParameters().replace(jump=10**400)
     least = Box(0, 0, 1e-170, 1e-170)
     assert least.iou(least) == 0.0
+
+
+def seldom(i: int) -> Frame:
+    return both(i) if i % 2 else without_depth(i)
+
+
+@pytest.mark.parametrize('blind', [1, 3])
+def test_several_who_were_chosen_before_depth_came_are_followed_by_it(blind: int):
+    """In one frame one becomes somebody, whom the other's look had not been compared with."""
+    targets = TargetSet('metric')
+    numbers = [targets.add(without_depth(0), one(0).box) for one in (left, right)]
+    assert targets.metric is not None
+    for i in range(1, 16):
+        tracks = targets.update(without_depth(i) if i < blind else both(i))
+        assert list(tracks) == numbers
+    for number, one in zip(numbers, (left, right), strict=True):
+        assert tracks[number].box is not None
+        assert tracks[number].box.iou(one(15).box) > 0.8
+        assert targets.metric.person(number) is not None
+        assert targets.add(both(15), one(15).box) == number
+    for number, one in zip(numbers, (left, right), strict=True):
+        targets.remove(number)
+        assert targets.add(both(16), one(16).box) == number
+
+
+def test_a_thing_that_is_drawn_again_keeps_its_id():
+    mug, frame = Box(100, 70, 10, 12), both(0)
+    targets = TargetSet('metric')
+    number = targets.add(frame, mug)
+    assert targets.add(frame, mug) == number
+    targets.update(both(1))
+    assert targets.add(both(2), mug.moved(1, 0)) == number
+    assert len(targets) == 1
+
+
+def test_who_is_chosen_again_while_it_is_open_whether_he_has_come_back_keeps_his_id():
+    def scene(i: int) -> Frame:
+        here = [Someone(-0.5, 3.0)] if i < 20 else [Someone(1.0, 3.4)] if i >= 50 else []
+        return picture(here, STEP * i)
+
+    targets = TargetSet('metric')
+    number = targets.add(scene(0), Someone(-0.5, 3.0).box)
+    assert targets.metric is not None
+    i = 0
+    while not (i > 50 and targets.metric._followers[number].glimpsed is not None):
+        i += 1
+        assert i < 60
+        tracks = targets.update(scene(i))
+    assert tracks[number].box is not None
+    assert targets.add(scene(i), tracks[number].box) == number
+    for j in range(i + 1, i + 30):
+        tracks = targets.update(scene(j))
+        assert list(tracks) == [number]
+        assert tracks[number].box is not None
+        assert tracks[number].box.iou(Someone(1.0, 3.4).box) > 0.8
+
+
+def test_a_camera_whose_intrinsics_stop_coming_is_the_same_camera():
+    answers = []
+    wide = dataclasses.replace(CAMERA, fx=160.0, fy=160.0)
+    for stop in (99, 8):
+        targets = TargetSet('metric')
+        number = targets.add(dataclasses.replace(both(0), intrinsics=wide), left(0).box)
+        assert targets.metric is not None
+        for i in range(1, 20):
+            frame = dataclasses.replace(both(i), intrinsics=wide if i < stop else None)
+            box = targets.update(frame)[number].box
+        person = targets.metric.person(number)
+        assert person is not None
+        answers.append((box, person.place.tolist()))
+    assert answers[0] == answers[1]
+
+
+@pytest.mark.parametrize('scene', [both, seldom])
+def test_intrinsics_that_come_late_start_all_over_at_the_first_depth_with_all_in_view(
+    scene, monkeypatch: pytest.MonkeyPatch
+):
+    """Also where depth comes in every other frame; and not a second time."""
+    restarts = []
+    whole = MetricTargets._start_over
+    monkeypatch.setattr(
+        MetricTargets,
+        '_start_over',
+        lambda self, frame: (restarts.append(frame), whole(self, frame))[1],
+    )
+    targets = TargetSet('metric')
+    for i in range(20):
+        frame = scene(i)
+        if i < 8:
+            frame = dataclasses.replace(frame, intrinsics=None)
+        if i == 0:
+            number = targets.add(frame, left(0).box)
+        else:
+            tracks = targets.update(frame)
+    assert [frame.stamp_ns for frame in restarts] == [scene(8 if scene is both else 9).stamp_ns]
+    assert tracks[number].box is not None
+    assert tracks[number].box.iou(left(19).box) > 0.8
+
+
+def test_two_whose_boxes_overlap_are_two_when_all_starts_over():
+    one = Someone(0.0, 3.0)
+    targets = TargetSet('metric')
+    frame = picture([one], 0.0)
+    first = targets.add(frame, one.box)
+    assert targets.metric is not None
+    targets.metric._followers[2] = targets.metric._followers[first]  # as if both were there
+    other = dataclasses.replace(
+        picture([one], STEP), intrinsics=dataclasses.replace(CAMERA, fx=1.1 * CAMERA.fx)
+    )
+    tracks = targets.update(other)
+    assert list(tracks) == [first, 2]
+    people = [each.person for each in targets.metric._followers.values()]
+    assert people[0] is not None
+    assert people[0] is not people[1]
+
+
+def test_one_target_alone_has_no_id():
+    tracker = create_tracker('metric')
+    assert tracker.start(both(0), left(0).box).id == 0
+    assert tracker.update(both(1)).id == 0

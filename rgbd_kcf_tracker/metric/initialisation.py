@@ -91,11 +91,12 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     if whole is not None:
         return behind or _within(scene, whole, box)
     piece = _piece_of(scene, told)
-    if piece is not None and (
-        _one_of_two(scene, piece, told) or _found_again(account, piece, parameters)
-    ):
+    if piece is not None and _found_again(account, piece, parameters):
         return piece
-    return behind or _scattered(scene, told) or _meant(account, box)
+    behind = behind or _scattered(scene, told)
+    if behind is None and piece is not None and _one_of_two(scene, piece, told):
+        return piece
+    return behind or _meant(account, box)
 
 
 def whole_of(account: Account, box: Box) -> Silhouette | None:

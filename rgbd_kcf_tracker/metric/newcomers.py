@@ -92,6 +92,9 @@ class Newcomers:
             tallest = math.inf
         for column, sight in enumerate(account.sights):
             row = account.owner[column]
+            # Whoever was welcomed in this very frame has just been found to be another's target.
+            if row >= len(account.looks):
+                continue
             person = account.people[row] if row >= 0 else None
             met = person is not None and (
                 person.first_seen <= self._since or person.number in self.beside

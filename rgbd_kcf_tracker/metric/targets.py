@@ -42,6 +42,8 @@ LONGEST_STEP = 5.0
 SAME_CAMERA = 0.02
 """Share by which the focal length of one camera may be told otherwise: more than calibrations of it
 differ by, and less than anybody's height is known to."""
+SAME_BOX = 0.5
+"""Overlap from which a box is about what is shown in another (PASCAL VOC)."""
 TURNS = 30.0
 """Times a second, of all targets together, that one followed by its look is searched for or learned
 from: each of a camera's 30 frames a second has time for one of them, whatever else it shows. One
@@ -77,6 +79,8 @@ class MetricTargets:
         self._time = 0.0
         self._frame: Frame | None = None
         self._camera: Intrinsics | None = None
+        self._metres: Intrinsics | None = None
+        self._size = 0, 0
 
     def __len__(self) -> int:
         return len(self._followers)
@@ -100,7 +104,13 @@ class MetricTargets:
                 self._unlearned = True
             self._learn()
         follower = self._follower(frame, box)
-        number = self._name(follower.person)
+        number = self._shown_in(box, follower)
+        if number is None:
+            number = self._name(follower.person)
+        elif follower.person is None and self._followers[number].person is not None:
+            return number  # it is followed by more than its look already
+        else:
+            self._replaced(number, follower)
         self._followers[number] = follower
         return number
 
@@ -131,7 +141,8 @@ class MetricTargets:
         self.settle()
         if self._in_other_metres(frame):
             self._start_over(frame)
-            return {number: each.track for number, each in self._followers.items()}
+            tracks = {number: each.track for number, each in self._followers.items()}
+            return {**tracks, **self._others(frame)} if self.everyone else tracks
         dt = self._perceive(frame)
         turns = self._turns(dt)
         view = self._reader.last_view
@@ -141,6 +152,8 @@ class MetricTargets:
             )
             for number, follower in self._followers.items()
         }
+        # Of whom depth shows nothing at first it is not known for a while who he is.
+        self._names |= {f.person.number: n for n, f in self._followers.items() if f.person}
         self._unlearned = True
         if self.everyone:
             self._learn()
@@ -193,12 +206,11 @@ class MetricTargets:
         So it is where the first images come before the intrinsics do: whatever is remembered is in
         metres that were a guess. While somebody is hidden, that is all that is known of him.
         """
-        last = self._frame
-        if last is None or frame.intrinsics is None or last.depth is None or frame.depth is None:
+        taken = self._metres
+        if taken is None or frame.intrinsics is None or frame.depth is None:
             return False
-        if (last.width, last.height) != (frame.width, frame.height):
+        if self._size != (frame.width, frame.height):
             return False
-        taken = self._camera or Intrinsics.guess(last.width, last.height)
         same = abs(frame.intrinsics.fx / taken.fx - 1) < SAME_CAMERA
         return not same and all(f.track.box is not None for f in self._followers.values())
 
@@ -206,13 +218,19 @@ class MetricTargets:
         """Start on all where they were a frame ago: what was remembered is in other metres."""
         before = {number: each.track for number, each in self._followers.items()}
         self._reader, self._crowd = self._new_memory()
-        self._names, self._followers = {}, {}
+        self._names, self._followers, self._metres = {}, {}, None
         self._perceive(frame)
         self._unlearned = True
         self._learn()
         for number, track in before.items():
             assert track.box is not None
-            follower = self._followers[number] = self._follower(frame, track.box)
+            follower = self._follower(frame, track.box)
+            if follower.person is not None and follower.person.number in self._names:
+                # Of two whose boxes overlap one is the surface: the other is known by his look.
+                follower = Follower(
+                    frame, None, self._crowd, track.box, self._parameters, self._cues
+                )
+            self._followers[number] = follower
             follower.track = dataclasses.replace(follower.first, id=number, score=track.score)
             if follower.person is not None:
                 self._names[follower.person.number] = number
@@ -224,7 +242,15 @@ class MetricTargets:
         self._stamp_ns = frame.stamp_ns
         self._time += dt
         self._frame = frame
+        size = frame.width, frame.height
+        if size != self._size:
+            self._size, self._camera, self._metres = size, None, None
         self._camera = frame.intrinsics or self._camera
+        if frame.intrinsics is None and self._camera is not None:
+            # A guess would put the room and everybody elsewhere.
+            frame = dataclasses.replace(frame, intrinsics=self._camera)
+        if frame.depth is not None and self._metres is None:
+            self._metres = self._camera or Intrinsics.guess(*size)
         scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
         self.account = None if scene is None else self._crowd.explain(scene, self._time)
         return dt
@@ -268,6 +294,32 @@ class MetricTargets:
             for person, seen in self.account.unmoved:
                 if self._reader.is_room(seen, self.account.scene):
                     person.upright = False
+
+    def _shown_in(self, box: Box, follower: Follower) -> int | None:
+        """The id of the target that a box of the last frame is about, None for nobody's.
+
+        Args:
+            box: the box.
+            follower: of what is in it.
+        """
+        mine = follower.person
+        for number, each in self._followers.items():
+            if mine is not None and each.person is mine:
+                return number
+        for number, each in self._followers.items():
+            unsure = mine is None or each.person is None or each.glimpsed is not None
+            shown = each.track.box
+            if unsure and shown is not None and shown.iou(box) >= SAME_BOX:
+                return number
+        return None
+
+    def _replaced(self, number: int, follower: Follower) -> None:
+        """Take whom a follower has found for who had an id until now."""
+        before, now = self._followers[number].person, follower.person
+        if before is not None and before is not now:
+            self._crowd.forget(before)
+        if now is not None:
+            self._names[now.number] = number
 
     def _name(self, person: Person | None) -> int:
         """The id of a person, or a new one."""
@@ -346,10 +398,10 @@ class MetricTracker:
         require_inside(box, frame)
         self._targets = MetricTargets(self._parameters, self._cues)
         self._number = self._targets.add(frame, box)
-        return self._targets.started(self._number)
+        return dataclasses.replace(self._targets.started(self._number), id=0)
 
     def update(self, frame: Frame) -> Track:
         """See :meth:`~rgbd_kcf_tracker.track.Tracker.update`."""
         if self._targets is None:
             return Track(None, TrackState.IDLE)
-        return self._targets.update(frame)[self._number]
+        return dataclasses.replace(self._targets.update(frame)[self._number], id=0)

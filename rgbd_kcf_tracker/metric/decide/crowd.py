@@ -369,6 +369,8 @@ class Crowd:
             seen = targets.get(person.number)
             if seen is not None:
                 seen_now.append((person, account.place(seen)))
+        known = {person.number for person in self.people}  # of some others are forgotten by now
+        seen_now = [each for each in seen_now if each[0].number in known]
         for person, place in seen_now:
             for other, there in seen_now:
                 if np.hypot(*(place - there)) > BESIDE:
@@ -392,7 +394,8 @@ class Crowd:
     def withdraw(self, person: Person, comeback: Comeback) -> list[Person]:
         """Forget what is known of somebody since a return; gives those who were seen beside him."""
         beside = [each for each in self.people if each.number in person.met - comeback.met]
-        person.gallery, person.met = comeback.known, set(comeback.met)
+        person.gallery = comeback.known
+        person.met = {each.number for each in self.people} & comeback.met
         for each in beside:
             each.met.discard(person.number)
         return beside
