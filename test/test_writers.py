@@ -298,6 +298,28 @@ def test_colour_alone_is_written_and_read(stamp_ns: int, tmp_path: Path) -> None
         assert recording.warnings == []  # asked for
 
 
+def test_time_that_jumps_back_stays_in_the_order_written(tmp_path: Path) -> None:
+    """Twice the same stamps, each frame with its depth, camera, truth and track; none is lost."""
+    step = 2_000_000_000
+    frames = [
+        dataclasses.replace(frame, stamp_ns=(number % 3) * step)
+        for number, frame in enumerate(make_frames(6))
+    ]
+    boxes = [Box(number + 1, 2, 3, 4) for number in range(5)]
+    with BagWriter(tmp_path / 'a.mcap') as writer:
+        for number, frame in enumerate(frames):
+            writer.write_frame(frame)
+            if number < len(boxes):
+                writer.write_truth(frame, boxes[number])
+            writer.write_track(frame, SEEN)
+    with AnyReader([tmp_path / 'a.mcap']) as bag:
+        logged = [t for c, t, _ in bag.messages() if c.topic.endswith('image_color_rect')]
+    assert logged == [0, step, 2 * step, 2 * step + 1, 3 * step + 1, 4 * step + 1]
+    with open_recording(tmp_path / 'a.mcap') as recording:
+        assert_same_frames(list(recording.frames()), frames)
+        assert recording.groundtruth == boxes
+
+
 def test_choices_are_checked(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match='compression'):
         BagWriter(tmp_path / 'a.mcap', compression='gzip')

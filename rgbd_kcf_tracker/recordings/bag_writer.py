@@ -67,9 +67,10 @@ GENERIC = CameraTopics('/color/image', '/depth/image', '/color/camera_info', 'ca
 class BagWriter(FrameWriter):
     """Writes mcap: images as a camera sends them, and the tracker's topics beside them.
 
-    Every message's time of recording is its frame's stamp. When a ``write`` returns, the system has
-    what it wrote: an interruption, kill -9 included, leaves a file without index that is read up to
-    there, and that ``convert`` mends.
+    Every message's time of recording is its frame's stamp; where stamps go back, it goes on from
+    there by their steps, as readers sort by it. When a ``write`` returns, the system has what it
+    wrote: an interruption, kill -9 included, leaves a file without index that is read up to there,
+    and that ``convert`` mends.
 
     Args:
         path: the file.
@@ -105,6 +106,8 @@ class BagWriter(FrameWriter):
         self._tracker = tracker.rstrip('/')
         self._depth_encoding = depth_encoding
         self._annotate = annotate
+        self._stamp_ns: int | None = None
+        self._log_ns = 0
         register(DEFINITIONS)
         self._make = TrackMessages(BAG_TYPES)
         self._walks = Walks()
@@ -117,7 +120,7 @@ class BagWriter(FrameWriter):
         header = self._header(frame)
         if frame.intrinsics is not None:
             info = self._make.camera_info(header, frame.width, frame.height, frame.intrinsics)
-            self._writer.write(self.topics.info, info, frame.stamp_ns)
+            self._writer.write(self.topics.info, info, self._logged(frame))
         self._write_image(self.topics.color, header, frame, encode_color(frame.color))
         if frame.depth is not None:
             image = encode_depth(frame.depth, self._depth_encoding)
@@ -126,8 +129,8 @@ class BagWriter(FrameWriter):
 
     def write_track(self, frame: Frame, track: Track) -> None:
         """Write what the tracker node publishes of the target; in space as far as that is known."""
-        header, stamp, make = self._header(frame), frame.stamp_ns, self._make
-        wheres = self._walks.update([track], stamp, frame.intrinsics, frame.pose)
+        header, stamp, make = self._header(frame), self._logged(frame), self._make
+        wheres = self._walks.update([track], frame.stamp_ns, frame.intrinsics, frame.pose)
         where = wheres.get(track.id)
         self._write_tracker('state', make.state(header, [track]), stamp)
         self._write_tracker('box', make.polygon(header, track.box), stamp)
@@ -158,9 +161,9 @@ class BagWriter(FrameWriter):
 
         A message without points says that the target is absent.
         """
-        header = self._header(frame)
-        self._writer.write(TRUTH_VISIBLE, self._make.polygon(header, visible), frame.stamp_ns)
-        self._writer.write(TRUTH_BODY, self._make.polygon(header, body), frame.stamp_ns)
+        header, stamp = self._header(frame), self._logged(frame)
+        self._writer.write(TRUTH_VISIBLE, self._make.polygon(header, visible), stamp)
+        self._writer.write(TRUTH_BODY, self._make.polygon(header, body), stamp)
         self._writer.flush()
 
     def close(self, whole: bool = True) -> None:
@@ -170,10 +173,19 @@ class BagWriter(FrameWriter):
     def _header(self, frame: Frame) -> Any:
         return self._make.header(frame.stamp_ns, self.topics.frame_id)
 
+    def _logged(self, frame: Frame) -> int:
+        """Time of recording of what is written of a frame, ns: never before that of another."""
+        if self._stamp_ns is None:
+            self._log_ns = frame.stamp_ns
+        elif frame.stamp_ns != self._stamp_ns:
+            self._log_ns += max(frame.stamp_ns - self._stamp_ns, 1)
+        self._stamp_ns = frame.stamp_ns
+        return self._log_ns
+
     def _write_tracker(self, name: str, message: Any | None, stamp: int) -> None:
         if message is not None:
             self._writer.write(f'{self._tracker}/{name}', message, stamp)
 
     def _write_image(self, topic: str, header: Any, frame: Frame, image: Any) -> None:
         message = self._make.image(header, image)
-        self._writer.write(topic, message, frame.stamp_ns)
+        self._writer.write(topic, message, self._logged(frame))

@@ -197,21 +197,28 @@ class BagRecording(Closing):
         topic = self.bag.topics.get(name)
         if topic is None or topic.type != POLYGON or not len(topic):
             return None
+        by_stamp: dict[int, list[tuple[int, int]]] = {}
+        for number, pair in enumerate(self._pairs):
+            logged = self._color.log_ns[pair.color]
+            by_stamp.setdefault(pair.stamp_ns, []).append((logged, number))
         boxes: dict[int, Box | None] = {}
-        for index, stamp in enumerate(topic.stamp_ns):
+        for index, (stamp, log_ns) in enumerate(zip(topic.stamp_ns, topic.log_ns, strict=True)):
+            if stamp not in by_stamp:
+                continue
+            # A stamp comes again where time jumps back.
+            _, frame = min(by_stamp[stamp], key=lambda there: abs(there[0] - log_ns))
             try:
-                boxes[stamp] = box_from_polygon(self.bag.message(topic, index).polygon.points)
+                boxes[frame] = box_from_polygon(self.bag.message(topic, index).polygon.points)
             except RgbdKcfError as error:
                 self.warnings.append(f'{name}: message {index} is left out: {error}')
-        by_frame = [p.stamp_ns in boxes for p in self._pairs]
-        last = max((i for i, there in enumerate(by_frame) if there), default=-1)
-        if last < 0:
+        if not boxes:
             self.warnings.append(f'{name}: its stamps are those of no colour image: left out')
             return None
-        missing = by_frame[: last + 1].count(False)
+        last = max(boxes)
+        missing = last + 1 - len(boxes)
         if missing:
             self.warnings.append(f'{name}: {missing} frames have no message: taken as absent')
-        return [boxes.get(p.stamp_ns) for p in self._pairs[: last + 1]]
+        return [boxes.get(number) for number in range(last + 1)]
 
 
 def describe_bag(path: Path, problem: str) -> RecordingInfo:
