@@ -10,7 +10,7 @@ from itertools import pairwise
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer
+from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer, patient_pairer
 
 MS = 1_000_000
 
@@ -55,6 +55,14 @@ def test_a_near_pair_is_not_held_back_at_a_steady_rate() -> None:
     feed(pairer, 'c0', 'd5', 'c33', 'd38', 'c66', flush=False)
     assert feed(pairer, 'd71', flush=False) == [('c66', 'd71')]
     assert feed(pairer, 'd94', 'c99', flush=False) == [('c99', 'd94')]
+
+
+def test_where_nothing_waits_the_nearest_is_the_nearest_whatever_the_rate() -> None:
+    """Depth 11 ms early, the next 9 ms late: at the rate seen so far it would have come later."""
+    steady = [e for i in range(6) for e in (f'd{33 * i + 19}', f'c{33 * i + 33}')]
+    events = [*steady, 'd220', 'c231', 'd240', 'c264']
+    assert dict(feed(StampPairer(0.02), *events))['c231'] == 'd220'
+    assert dict(feed(patient_pairer(0.02), *events))['c231'] == 'd240'
 
 
 def test_exact_goes_before_near() -> None:

@@ -110,17 +110,20 @@ def test_answer_is_due_only_when_the_tracker_can_know_the_pair() -> None:
     stop = threading.Event()
     answers.sent_color(1000 * MS)
     answers.sent_depth(1018 * MS)
-    answers.answered(1000 * MS)
-    answers.sent_color(1033 * MS)
-    answers.sent_depth(1051 * MS)
     assert answers.wait(0.0, stop)
-    answers.sent_color(1066 * MS)
+    # The depth of 1018 is nearer to it than to the one before, which goes out alone.
+    answers.sent_color(1033 * MS)
     assert not answers.wait(0.0, stop)
-    # The depth of 1051 is nearer to it than to the one before, which goes out alone.
-    for stamp in (1033, 1066):
-        answers.answered(stamp * MS)
+    answers.answered(1000 * MS)
+    assert answers.wait(0.0, stop)
+    answers.sent_depth(1051 * MS)
+    assert not answers.wait(0.0, stop)
+    answers.answered(1033 * MS)
+    answers.sent_color(1066 * MS)
     assert answers.wait(0.0, stop)
     answers.sent_all()
+    assert not answers.wait(0.0, stop)
+    answers.answered(1066 * MS)
     assert answers.wait(0.0, stop)
     assert answers.pairs == len(answers.latencies_s) == 3
 

@@ -96,8 +96,7 @@ class StampPairer(Generic[C, D]):
 
     Every colour message comes out exactly once (unless it is a duplicate or late), with depth or,
     after the depth stream has passed it, without. Pairs come out in rising order of stamp between
-    two jumps back. A pair within the tolerance is given out at once where, at the rates seen so
-    far, no nearer partner can come.
+    two jumps back.
 
     Args:
         tolerance_s: largest distance of stamps within a pair, seconds; 0 for equal stamps only.
@@ -106,6 +105,8 @@ class StampPairer(Generic[C, D]):
             alone; above 0 for streams whose messages change places on the way.
         max_wait_s: how far the colour stream may run ahead of a colour message that waits.
         jump_back_s: a message so much older than the newest is a jump back, not a late message.
+        by_rate: give out a pair within the tolerance at once where, at the rates seen so far, no
+            nearer partner will come; else stamps alone decide.
     """
 
     def __init__(
@@ -115,12 +116,14 @@ class StampPairer(Generic[C, D]):
         patience_s: float = 0.0,
         max_wait_s: float = 0.5,
         jump_back_s: float = JUMP_BACK_S,
+        by_rate: bool = True,
     ) -> None:
         self.tolerance_ns = round(tolerance_s * 1e9)
         self.capacity = max(capacity, 1)
         self.patience_ns = round(patience_s * 1e9)
         self.max_wait_ns = round(max_wait_s * 1e9)
         self.jump_back_ns = round(jump_back_s * 1e9)
+        self.by_rate = by_rate
         self.counts = PairingCounts()
         self._colors: dict[int, C] = {}
         self._depths: dict[int, D] = {}
@@ -182,6 +185,7 @@ class StampPairer(Generic[C, D]):
         out = self._give_out_all()
         self.counts.depth_alone += len(self._depths)
         self._depths.clear()
+        self._used_depths.clear()
         return out
 
     @property
@@ -234,10 +238,10 @@ class StampPairer(Generic[C, D]):
         )
         if partner is None:
             return passed
-        if partner < stamp:
-            return passed or 2 * (stamp - partner) < self._depth_clock.shortest_gap
-        seen = newest_color is not None and newest_color >= partner
-        return seen or 2 * (partner - stamp) < self._color_clock.shortest_gap
+        clock, seen = self._depth_clock, passed
+        if partner > stamp:
+            clock, seen = self._color_clock, newest_color is not None and newest_color >= partner
+        return seen or (self.by_rate and 2 * abs(partner - stamp) < clock.shortest_gap)
 
     def _take(self, stamp: int, partner: int | None) -> Pair[C, D]:
         color = self._colors.pop(stamp)
@@ -279,7 +283,7 @@ def patient_pairer(tolerance_s: float = DEFAULT_TOLERANCE_S) -> StampPairer[C, D
     Stamps alone decide, however late one stream is: the tracker, the replay node that waits for its
     answers, and the reader of recordings must agree on what is a pair.
     """
-    return StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0)
+    return StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0, by_rate=False)
 
 
 class _Clock:
