@@ -298,13 +298,21 @@ def test_colour_alone_is_written_and_read(stamp_ns: int, tmp_path: Path) -> None
         assert recording.warnings == []  # asked for
 
 
-def test_time_that_jumps_back_stays_in_the_order_written(tmp_path: Path) -> None:
-    """Twice the same stamps, each frame with its depth, camera, truth and track; none is lost."""
+@pytest.mark.parametrize('without', [(), (2, 3)])
+def test_time_that_jumps_back_stays_in_the_order_written(
+    without: tuple[int, ...], tmp_path: Path
+) -> None:
+    """Twice the same stamps, each frame with its depth, camera, truth and track; none is lost.
+
+    Depth that is missing about the jump does not show it.
+    """
     step = 2_000_000_000
     frames = [
         dataclasses.replace(frame, stamp_ns=(number % 3) * step)
         for number, frame in enumerate(make_frames(6))
     ]
+    for number in without:
+        frames[number] = dataclasses.replace(frames[number], depth=None)
     boxes = [Box(number + 1, 2, 3, 4) for number in range(5)]
     with BagWriter(tmp_path / 'a.mcap') as writer:
         for number, frame in enumerate(frames):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_right
 
 from rgbd_kcf_tracker.recordings.pairing import (
     DEFAULT_TOLERANCE_S,
@@ -19,6 +20,8 @@ from rgbd_kcf_tracker.recordings.storage import Topic
 
 FramePair = Pair[int, int]
 """Numbers of a colour and a depth message within their topics."""
+_Event = tuple[int, bool, int]
+"""Stamp, whether it is colour, and number of a message."""
 
 _WIDEST_S = 0.5
 _JUMP_NS = round(JUMP_BACK_S * 1e9)
@@ -45,11 +48,11 @@ def pair_topics(
     if depth is not None and (color_stamps is color.log_ns) != (depth_stamps is depth.log_ns):
         color_stamps, depth_stamps = color.log_ns, depth.log_ns
     logged = nothing if depth is None else depth.log_ns
-    events = _in_time_order((color_stamps, color.log_ns), (depth_stamps, logged))
+    rounds = _rounds((color_stamps, color.log_ns), (depth_stamps, logged))
     tolerance = DEFAULT_TOLERANCE_S if tolerance_s is None else tolerance_s
-    pairs, counts = _run_pairer(events, tolerance)
+    pairs, counts = _run_pairer(rounds, tolerance)
     if tolerance_s is None and depth_stamps and all(p.depth is None for p in pairs):
-        wider, wider_counts = _run_pairer(events, _WIDEST_S)
+        wider, wider_counts = _run_pairer(rounds, _WIDEST_S)
         distances = [
             abs(p.depth_stamp_ns - p.stamp_ns) for p in wider if p.depth_stamp_ns is not None
         ]
@@ -106,37 +109,40 @@ def _oddities(
 
 
 def _run_pairer(
-    events: list[tuple[bool, int, int]], tolerance_s: float
+    rounds: list[list[_Event]], tolerance_s: float
 ) -> tuple[list[FramePair], PairingCounts]:
     pairer: StampPairer[int, int] = patient_pairer(tolerance_s)
     pairs: list[FramePair] = []
-    for is_color, stamp, index in events:
-        pairs += pairer.add_color(stamp, index) if is_color else pairer.add_depth(stamp, index)
-    pairs += pairer.flush()
+    for events in rounds:
+        for stamp, is_color, index in events:
+            pairs += pairer.add_color(stamp, index) if is_color else pairer.add_depth(stamp, index)
+        pairs += pairer.flush()
     return pairs, pairer.counts
 
 
-def _in_time_order(
+def _rounds(
     color: tuple[array[int], array[int]], depth: tuple[array[int], array[int]]
-) -> list[tuple[bool, int, int]]:
-    """``(is colour, stamp, index)`` of both streams, by stamp between the jumps back of time.
+) -> list[list[_Event]]:
+    """Both streams by stamp, from one jump back of time to the next.
 
     Messages that changed places while they were recorded are put right; where time jumps back (a
     bag of a bag that looped) what comes after stays after.
+
+    Args:
+        color: its stamps and times of recording.
+        depth: the same.
     """
-    streams = []
-    for is_color, (stamps, logged) in ((True, color), (False, depth)):
-        segments = _segments(stamps)
-        streams.append(
-            [(segments[i], stamps[i], is_color, i, logged[i]) for i in range(len(stamps))]
-        )
-    counts = [stream[-1][0] if stream else None for stream in streams]
-    events = streams[0] + streams[1]
-    if None in counts or counts[0] == counts[1]:
-        events.sort(key=lambda e: (e[0], e[1], e[2]))
-    else:
-        events.sort(key=lambda e: (e[4], e[2]))
-    return [(is_color, stamp, index) for _, stamp, is_color, index, _ in events]
+    colors, depths = _segments(color[0]), _segments(depth[0])
+    count = max(colors, default=0) + 1
+    if depths and depths[-1] + 1 != count:
+        # Depth that is missing about a jump does not show it, but when it was recorded does.
+        starts = [color[1][colors.index(n)] for n in range(1, count)]
+        depths = [bisect_right(starts, logged) for logged in depth[1]]
+    rounds: list[list[_Event]] = [[] for _ in range(count)]
+    for is_color, segments, stamps in ((True, colors, color[0]), (False, depths, depth[0])):
+        for index, (segment, stamp) in enumerate(zip(segments, stamps, strict=True)):
+            rounds[segment].append((stamp, is_color, index))
+    return [sorted(events) for events in rounds]
 
 
 def _overtaken(stamps: array[int]) -> int:

@@ -176,7 +176,7 @@ class BagWriter(FrameWriter):
     def _logged(self, frame: Frame) -> int:
         """Time of recording of what is written of a frame, ns: never before that of another."""
         if self._stamp_ns is None:
-            self._log_ns = frame.stamp_ns
+            self._log_ns = max(frame.stamp_ns, 0)  # MCAP has none before 1970
         elif frame.stamp_ns != self._stamp_ns:
             self._log_ns += max(frame.stamp_ns - self._stamp_ns, 1)
         self._stamp_ns = frame.stamp_ns
