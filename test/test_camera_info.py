@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
 from rgbd_kcf_tracker.recordings.camera_info import camera_from_info, is_rectified
+from rgbd_kcf_tracker.recordings.copying import output_topics, write_recording
 from rgbd_kcf_tracker.recordings.encoding import encode_color, encode_depth
 from rgbd_kcf_tracker.recordings.sequence_writer import SequenceWriter
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS, create_tracker, default_parameters
@@ -219,8 +220,12 @@ def test_converted_and_written_as_a_folder_the_lens_stays(
     with SequenceWriter(tmp_path / 'folder') as writer:
         for frame in frames:
             writer.write(frame, None)
-    assert main(['convert', str(tmp_path / 'folder'), str(tmp_path / 'b.mcap')]) == 0
-    for copy in ('folder', 'b.mcap'):
+    copies = ['folder']
+    for names in ('generic', 'kinect2_hd', 'kinect2_sd'):
+        copies.append(f'{names}.mcap')
+        options = [str(tmp_path / 'folder'), str(tmp_path / copies[-1]), '--camera', names]
+        assert main(['convert', *options]) == 0
+    for copy in copies:
         with open_recording(tmp_path / copy) as recording:
             assert recording.intrinsics == camera
     capsys.readouterr()
@@ -229,6 +234,36 @@ def test_converted_and_written_as_a_folder_the_lens_stays(
     assert main(['info', str(path), '--json']) == 0
     told = json.loads(capsys.readouterr().out)['intrinsics']
     assert (told['distortion_model'], len(told['d'])) == ('plumb_bob', 5)
+
+
+@pytest.mark.parametrize(
+    ('name', 'raw'),
+    [
+        ('/kinect2/qhd/image_color_rect', '/kinect2/qhd/image_color'),
+        ('/rgb/image_rect_color', '/rgb/image_color'),
+        ('/left/rect/image', '/left/image'),
+        ('/left/rect_image', '/left/image'),
+        (RAW, RAW),
+        ('/direct/image', '/direct/image'),
+    ],
+)
+def test_what_is_no_rectified_picture_is_not_written_as_one(
+    name: str, raw: str, tmp_path: Path
+) -> None:
+    """Also where the source says so by a wrong name, and the user has put it right."""
+    frame, _ = Sensor().shot(PLACES[0], 0)
+    sent = camera_messages([frame], color=name, depth=DEPTH, info=None)
+    sent += [Sent(INFO, s.log_ns, Sensor().info()) for s in sent[:1]]
+    with open_recording(
+        write_mcap(tmp_path / 'a.mcap', sent), ReadOptions(info_topic=INFO, rectified='no')
+    ) as recording:
+        camera, (topics, _) = recording.intrinsics, output_topics(recording)
+        write_recording(recording, tmp_path / 'b.mcap', topics=topics)
+    assert camera is not None
+    assert camera.lens is not None
+    assert (topics.color, topics.depth) == (raw, DEPTH)
+    with open_recording(tmp_path / 'b.mcap') as recording:
+        assert recording.intrinsics == camera
 
 
 def test_live_messages_are_read_by_the_same_rule() -> None:

@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.bag_types import BAG_TYPES, register
+from rgbd_kcf_tracker.recordings.camera_info import unrectified
 from rgbd_kcf_tracker.recordings.encoding import (
     encode_color,
     encode_compressed_color,
@@ -55,6 +56,12 @@ class CameraTopics:
             f'{base}/camera_info',
             f'kinect2_{kind}_optical_frame',
         )
+
+    def showing(self, intrinsics: Intrinsics | None) -> CameraTopics:
+        """The names for images of a camera: one with a lens is not read from ``rect`` ones."""
+        if intrinsics is None or intrinsics.lens is None:
+            return self
+        return replace(self, color=unrectified(self.color), depth=unrectified(self.depth))
 
 
 KINECT2_HD = CameraTopics.kinect2('hd')

@@ -64,6 +64,15 @@ def is_rectified(topic: str) -> bool:
     return _RECT.search(topic) is not None
 
 
+def unrectified(topic: str) -> str:
+    """The name of a topic without what says that its pictures are rectified.
+
+    >>> unrectified('/kinect2/qhd/image_color_rect'), unrectified('/rgb/image_rect_color')
+    ('/kinect2/qhd/image_color', '/rgb/image_color')
+    """
+    return _RECT.sub(lambda found: found[3] and ('/' if '/' in found[0] else '_'), topic)
+
+
 def camera_from_info(msg: Any, topic: str = '', rectified: str = AUTO) -> Camera | None:
     """The camera of a topic's pictures.
 

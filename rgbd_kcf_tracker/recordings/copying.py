@@ -35,7 +35,7 @@ def output_topics(recording: Recording) -> tuple[CameraTopics, str]:
     """Topics and depth encoding for a bag written from a recording.
 
     A bag's own names stay, without the suffix of a compressed transport, as images are written raw;
-    a folder gets the names that the tracker node listens to.
+    a folder gets the names that the tracker node listens to. See :meth:`CameraTopics.showing`.
     """
     if not isinstance(recording, BagRecording):
         return GENERIC, '16UC1'
@@ -50,7 +50,7 @@ def output_topics(recording: Recording) -> tuple[CameraTopics, str]:
     else:
         topics = replace(topics, info=topics.color.rpartition('/')[0] + '/camera_info')
     metres = recording.depth_encoding().startswith('32FC1')
-    return topics, '32FC1' if metres else '16UC1'
+    return topics.showing(recording.intrinsics), '32FC1' if metres else '16UC1'
 
 
 def write_recording(
@@ -71,6 +71,7 @@ def write_recording(
         RecordingError: where one cannot be read or written.
     """
     truth, body = recording.groundtruth, recording.groundtruth_body
+    topics = topics.showing(recording.intrinsics)
     count = 0
     with BagWriter(path, topics, compression=compression, overwrite=overwrite) as writer:
         for frame in progress(recording.frames(), len(recording)):
