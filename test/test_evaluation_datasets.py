@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.evaluation.runner import identify
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter
+from rgbd_kcf_tracker.recordings import BagWriter, SequenceWriter, open_recording
 
 WIDTH, HEIGHT = 64, 48
 
@@ -328,9 +328,37 @@ def test_our_layout_with_lines_and_frames_of_different_number(own: Path):
     assert f'{truth}, line 3: the file ends here' in error_of(own)
 
 
-def test_our_layout_with_a_depth_image_missing(own: Path):
+def test_our_layout_is_read_as_track_reads_it(own: Path):
+    """A frame without depth, and stamps that stand still: the same frames, the same warnings."""
     (own / 'depth' / '000003.png').unlink()
-    assert 'rgb/000003.png' in error_of(own)
+    (own / 'timestamps.txt').write_text('100\n200\n200\n500\n')
+    (sequence,) = open_dataset(str(own))
+    opened = sequence.open()
+    with open_recording(own) as recording:
+        assert opened.warnings == tuple(recording.warnings)
+        for sample, frame in zip(opened.samples, recording.frames(), strict=True):
+            assert sample.frame.stamp_ns == frame.stamp_ns
+            assert (sample.frame.depth is None) == (frame.depth is None)
+    assert '1 of 4 colour images have no depth image' in opened.warnings[0]
+    assert '1 stamps do not come after the one before' in opened.warnings[1]
+
+
+@pytest.mark.parametrize('beside', ['timestamps.txt', 'intrinsics.json', None])
+def test_our_layout_with_another_name_of_the_colour_folder(own: Path, beside: str | None):
+    """One that VOT has, too: ours where a file says so, or where it is asked for."""
+    (own / 'rgb').rename(own / 'color')
+    for name in ('timestamps.txt', 'intrinsics.json'):
+        if name != beside:
+            (own / name).unlink()
+    (sequence,) = open_dataset(str(own))
+    assert sequence.kind == ('folder' if beside else 'vot')
+    (asked,) = open_dataset(str(own), DatasetOptions(kind='folder'))
+    assert asked.kind == 'folder'
+    assert own / 'color' in asked.content
+    first = next(iter(asked.open().samples)).frame
+    assert (first.stamp_ns == 100) == (beside == 'timestamps.txt')
+    assert (first.intrinsics is not None) == (beside == 'intrinsics.json')
+    assert open_dataset(str(own), DatasetOptions(kind='vot'))[0].kind == 'vot'
 
 
 def test_our_layout_with_an_image_that_is_none(own: Path):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -48,7 +48,66 @@ DEPTH_FOLDER = 'depth'
 
 def is_sequence_folder(path: Path) -> bool:
     """Whether ``path`` is a folder with a folder of colour images in it."""
-    return any((path / name).is_dir() for name in COLOR_FOLDERS)
+    return color_folder(path) is not None
+
+
+def color_folder(path: Path) -> Path | None:
+    """The folder of colour images in a folder, None where none is."""
+    return next((path / name for name in COLOR_FOLDERS if (path / name).is_dir()), None)
+
+
+def folder_depths(
+    path: Path, colors: tuple[Path, ...], warn: Callable[[str], None]
+) -> tuple[Path | None, ...]:
+    """The depth image of each colour image of a folder, None where it has none; empty: none has.
+
+    Raises:
+        RecordingError: where ``depth/`` holds none for any, or cannot be read.
+    """
+    folder = path / DEPTH_FOLDER
+    if not folder.is_dir():
+        if os.path.lexists(folder):
+            warn(f'{folder} is no folder of images: read as colour alone')
+        return ()
+    depths = depths_beside(colors, folder)
+    missing = depths.count(None)
+    if missing == len(depths):
+        raise RecordingError(
+            f'no image in {folder} has the name of one in {colors[0].parent}: '
+            'give colour and depth of a frame the same number'
+        )
+    if missing:
+        warn(f'{missing} of {len(depths)} colour images have no depth image')
+    return depths
+
+
+def folder_stamps(
+    path: Path, colors: tuple[Path, ...], fps: float, warn: Callable[[str], None]
+) -> tuple[int, ...]:
+    """The stamp of each colour image of a folder, ns: of ``timestamps.txt``, else at ``fps``.
+
+    Raises:
+        RecordingError: where its lines are not those of the images.
+    """
+    path = path / 'timestamps.txt'
+    if not path.exists():
+        return even_stamps(len(colors), fps)
+    if lost := unnumbered(colors):
+        raise RecordingError(f'{lost}: which line of {path} is its? Number it, or take it out')
+    stamps = tuple(read_stamps(path))
+    if len(stamps) != len(colors):
+        gap = missing_number(colors, len(stamps))
+        hint = f', and {gap} is missing' if gap else ''
+        raise RecordingError(
+            f'{path} has {len(stamps)} lines for {len(colors)} images{hint}: write one per image'
+        )
+    back = sum(b <= a for a, b in pairwise(stamps))
+    if back:
+        warn(
+            f'{path.name}: {back} stamps do not come after the one before; unless time jumps '
+            'back by a second there, they are taken to be a nanosecond later'
+        )
+    return rising(stamps)
 
 
 def _refuse_topics(path: Path, options: ReadOptions) -> None:
@@ -79,12 +138,12 @@ class SequenceFolder(Closing):
         self.name = path.resolve().name
         self.warnings: list[str] = []
         _refuse_topics(path, options)
-        self._color_folder = next(path / n for n in COLOR_FOLDERS if (path / n).is_dir())
-        colors = image_files(self._color_folder)
+        colors = image_files(color_folder(path) or path / COLOR_FOLDERS[0])
+        warn, no_depth = self.warnings.append, options.depth_topic == NO_DEPTH
         self._files = ImageFrames(
             colors,
-            self._find_depths(colors, options),
-            self._read_stamps(colors, options),
+            () if no_depth else folder_depths(path, colors, warn),
+            folder_stamps(path, colors, options.fps, warn),
             options.intrinsics or folder_intrinsics(path),
             options.max_pixels,
         )
@@ -111,7 +170,7 @@ class SequenceFolder(Closing):
         gaps = [b - a for a, b in pairwise(stamps) if b > a]
         rate = 1e9 / statistics.median(gaps) if gaps else None
         depths = [p for p in self._files.depths if p is not None]
-        streams = [_stream(self._color_folder.name, self._files.colors, rate, 'color')]
+        streams = [_stream(self._files.colors[0].parent.name, self._files.colors, rate, 'color')]
         if depths:
             streams.append(_stream(DEPTH_FOLDER, depths, rate, 'depth'))
         for name, boxes in (
@@ -145,49 +204,6 @@ class SequenceFolder(Closing):
 
     def close(self) -> None:
         """Nothing stays open."""
-
-    def _find_depths(
-        self, colors: tuple[Path, ...], options: ReadOptions
-    ) -> tuple[Path | None, ...]:
-        folder = self.path / DEPTH_FOLDER
-        if options.depth_topic == NO_DEPTH:
-            return ()
-        if not folder.is_dir():
-            if os.path.lexists(folder):
-                self.warnings.append(f'{folder} is no folder of images: read as colour alone')
-            return ()
-        depths = depths_beside(colors, folder)
-        missing = sum(p is None for p in depths)
-        if missing == len(depths):
-            raise RecordingError(
-                f'no image in {folder} has the name of one in {self._color_folder}: '
-                'give colour and depth of a frame the same number'
-            )
-        if missing:
-            self.warnings.append(f'{missing} of {len(depths)} colour images have no depth image')
-        return depths
-
-    def _read_stamps(self, colors: tuple[Path, ...], options: ReadOptions) -> tuple[int, ...]:
-        path = self.path / 'timestamps.txt'
-        if not path.exists():
-            return even_stamps(len(colors), options.fps)
-        if lost := unnumbered(colors):
-            raise RecordingError(f'{lost}: which line of {path} is its? Number it, or take it out')
-        stamps = tuple(read_stamps(path))
-        if len(stamps) != len(colors):
-            gap = missing_number(colors, len(stamps))
-            hint = f', and {gap} is missing' if gap else ''
-            raise RecordingError(
-                f'{path} has {len(stamps)} lines for {len(colors)} images{hint}: '
-                'write one per image'
-            )
-        back = sum(b <= a for a, b in pairwise(stamps))
-        if back:
-            self.warnings.append(
-                f'{path.name}: {back} stamps do not come after the one before; unless time jumps '
-                'back by a second there, they are taken to be a nanosecond later'
-            )
-        return rising(stamps)
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         path = self.path / name

@@ -174,7 +174,7 @@ def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
     if princeton.is_sequence(path) and kind in ('auto', 'princeton'):
         table = path.parent / princeton.CATEGORIES_FILE
         return [princeton.find(path, princeton.read_categories(table))]
-    if folder.is_sequence(path) and kind in ('auto', 'folder'):
+    if kind in ('auto', 'folder') and folder.is_sequence(path, kind == 'folder'):
         return folder.find(path, options.fps)
     if vot.is_sequence(path) and kind in ('auto', *_SAME_AS_VOT):
         return [vot.find(path, options.fps)]

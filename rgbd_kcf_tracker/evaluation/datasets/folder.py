@@ -3,6 +3,9 @@
 
 """Our own folder layout: ``rgb/``, ``depth/``, and one ground truth, or one per annotated person.
 
+The colour images may lie in ``color/`` or ``img/``, too, as in other layouts: where this one is
+asked for, or a file that only it has lies beside them.
+
 People are annotated in a file each, ``groundtruth_PERSON.txt``, or together in ``mot.txt``, as MOT
 Challenge text.
 """
@@ -10,7 +13,7 @@ Challenge text.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -32,30 +35,42 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import (
     ImageFrames,
-    depths_beside,
-    even_stamps,
     image_files,
 )
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
+from rgbd_kcf_tracker.recordings.sequences import (
+    COLOR_FOLDERS,
+    color_folder,
+    folder_depths,
+    folder_stamps,
+)
 from rgbd_kcf_tracker.recordings.textfiles import (
     CAMERA_INFO,
     INTRINSICS,
     folder_intrinsics,
     read_boxes,
     read_lines,
-    read_stamps,
 )
 
 TAIL_FRAMES = 15
 """Frames after a person was last seen that still count: the tracker must say that they are gone."""
 
 _BODY = 'groundtruth_body.txt'
-_PARTS = ('rgb', 'depth', _BODY, 'timestamps.txt', INTRINSICS, CAMERA_INFO)
+_PARTS = ('timestamps.txt', INTRINSICS, CAMERA_INFO)
+"""Files that no other layout has."""
 
 
-def is_sequence(path: Path) -> bool:
-    """Whether a folder is a sequence in our layout, annotated or not."""
-    return (path / 'rgb').is_dir()
+def is_sequence(path: Path, asked: bool = False) -> bool:
+    """Whether a folder is a sequence in our layout, annotated or not.
+
+    Args:
+        path: the folder.
+        asked: this layout is asked for.
+    """
+    colors = color_folder(path)
+    return colors is not None and (
+        asked or colors.name == COLOR_FOLDERS[0] or any((path / n).is_file() for n in _PARTS)
+    )
 
 
 def find(path: Path, fps: float) -> list[Sequence]:
@@ -73,12 +88,10 @@ def find(path: Path, fps: float) -> list[Sequence]:
         files = (
             truth,
             visible,
-            path / 'rgb',
+            _colors(path),
             path / 'depth',
             _body_file(truth) if person else path / _BODY,
-            path / 'timestamps.txt',
-            path / INTRINSICS,
-            path / CAMERA_INFO,
+            *(path / name for name in _PARTS),
         )
         result.append(
             Sequence(
@@ -107,7 +120,7 @@ def _find_ids(path: Path, fps: float) -> list[Sequence]:
     except RecordingError as error:
         return [broken(path, str(error))]
     clear = (rows.scores > 0) & (rows.ids != REGION_ID)
-    files = (truth, path / 'rgb', path / 'depth', *(path / name for name in _PARTS[3:]))
+    files = (truth, _colors(path), path / 'depth', *(path / name for name in _PARTS))
     return [
         Sequence(
             name=f'{path.name}/{who}',
@@ -131,7 +144,7 @@ def load_id(path: Path, who: int, fps: float) -> Opened:
         DatasetError: where the person is never clearly in view.
         RecordingError: for a file that cannot be read or a line that is no sighting.
     """
-    images = image_files(path / 'rgb')
+    images = image_files(_colors(path))
     rows = read_mot(path / MOT_FILE, len(images), regions=True)
     rows = rows.only(rows.ids == who)
     clear = rows.frames[rows.scores > 0]
@@ -143,13 +156,16 @@ def load_id(path: Path, who: int, fps: float) -> Opened:
         boxes[frame] = rows.box(row)
         judged[frame] = bool(rows.scores[row] > 0)
     start, end = int(clear[0]), min(len(images), int(rows.frames[-1]) + TAIL_FRAMES + 1)
-    frames = read_frames(path, images, fps)
+    warnings: list[str] = []
+    frames = read_frames(path, images, fps, warnings.append)
 
     def samples() -> Iterator[Sample]:
         for number, sample in enumerate(with_truth(frames, boxes, None, None, start, end), start):
             yield dataclasses.replace(sample, judged=judged[number])
 
-    return Opened(samples(), length=end - start, start=start, total=len(images))
+    return Opened(
+        samples(), length=end - start, start=start, total=len(images), warnings=tuple(warnings)
+    )
 
 
 def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: float) -> Opened:
@@ -162,20 +178,20 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         DatasetError: where numbers of lines and images differ, or the target is never seen.
         RecordingError: for a file that cannot be read or a line that is no box.
     """
-    images = image_files(path / 'rgb')
+    images = image_files(_colors(path))
     if not truth_path.exists():
         raise DatasetError(f'{path} has no {truth_path.name}: nothing to measure against')
     boxes = read_boxes(truth_path)
-    check_lengths(truth_path, len(boxes), images, path / 'rgb')
+    check_lengths(truth_path, len(boxes), images, images[0].parent)
     body = None
     body_path = _body_file(truth_path) if person else path / _BODY
     if body_path.exists():
         body = read_boxes(body_path)
-        check_lengths(body_path, len(body), images, path / 'rgb')
+        check_lengths(body_path, len(body), images, images[0].parent)
     fractions = None
     if visible_path.exists():
         fractions = read_fractions(visible_path)
-        check_lengths(visible_path, len(fractions), images, path / 'rgb')
+        check_lengths(visible_path, len(fractions), images, images[0].parent)
 
     seen = [i for i, box in enumerate(boxes) if box is not None]
     clear = [i for i in seen if is_clear(boxes[i], fractions[i] if fractions else None)]
@@ -185,14 +201,21 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         )
     start = clear[0]
     end = min(len(images), seen[-1] + TAIL_FRAMES + 1) if person else len(images)
-    frames = read_frames(path, images, fps)
+    warnings: list[str] = []
+    frames = read_frames(path, images, fps, warnings.append)
     return Opened(
         with_truth(frames, boxes, body, fractions, start, end),
         length=end - start,
         start=start,
         total=len(images),
         has_body=body is not None,
+        warnings=tuple(warnings),
     )
+
+
+def _colors(path: Path) -> Path:
+    """The folder of colour images."""
+    return color_folder(path) or path / COLOR_FOLDERS[0]
 
 
 def _body_file(truth_path: Path) -> Path:
@@ -217,23 +240,27 @@ def read_fractions(path: Path) -> list[float]:
     return result
 
 
-def read_frames(path: Path, images: tuple[Path, ...], fps: float) -> ImageFrames:
+def read_frames(
+    path: Path,
+    images: tuple[Path, ...],
+    fps: float,
+    warn: Callable[[str], None] | None = None,
+) -> ImageFrames:
     """The frames of a folder: its images with what lies beside them.
 
+    Args:
+        path: the folder.
+        images: its colour images.
+        fps: their rate where it has no ``timestamps.txt``.
+        warn: is told in words what is odd; None: a depth image that is missing is an error.
+
     Raises:
-        DatasetError: where the depth image or the stamp of a frame is missing.
-        RecordingError: for a file that cannot be read.
+        DatasetError: where the depth image of a frame is missing.
+        RecordingError: for a file that cannot be read, or the stamp of a frame is missing.
     """
-    depths: tuple[Path | None, ...] = ()
-    if (path / 'depth').is_dir():
-        depths = depths_beside(images, path / 'depth')
-        lost = next((p for p, d in zip(images, depths, strict=True) if d is None), None)
-        if lost is not None:
-            raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')
-    stamps = even_stamps(len(images), fps)
-    stamps_path = path / 'timestamps.txt'
-    if stamps_path.exists():
-        stamps = tuple(read_stamps(stamps_path))
-        check_lengths(stamps_path, len(stamps), images, path / 'rgb')
-    intrinsics = folder_intrinsics(path)
-    return ImageFrames(images, depths, stamps, intrinsics)
+    depths = folder_depths(path, images, warn or (lambda text: None))
+    if warn is None and None in depths:
+        lost = images[depths.index(None)]
+        raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')
+    stamps = folder_stamps(path, images, fps, warn or (lambda text: None))
+    return ImageFrames(images, depths, stamps, folder_intrinsics(path))
