@@ -192,6 +192,31 @@ def test_ids_stay_when_the_variant_changes() -> None:
     assert made.others[0].box.iou(SECOND.box) > 0.5
 
 
+def test_everyone_keeps_his_id_when_parameters_change() -> None:
+    made, refused, _ = session()
+    made.everyone = True
+    run(made, 0, 3, [])
+    run(made, 3, 6)
+    known = {track.id: track.box for track in made.others}
+    assert len(known) == 3
+    at_work = made._targets
+    made.configure('metric', default_parameters('metric'))  # as one of another variant was set
+    run(made, 9, 1)
+    assert made._targets is at_work
+    made.configure('metric', default_parameters('metric').replace(lost_after=5.0))
+    run(made, 10, 4)
+    assert made._targets is not at_work
+    assert (made.track.state, ids(made)) == (TrackState.IDLE, sorted(known))
+    assert all(track.box.iou(known[track.id]) > 0.6 for track in made.others)
+    assert not made.asked_for
+    made.choose(lambda _: SECOND.box)
+    made.configure('metric', default_parameters('metric'))
+    run(made, 14, 4)
+    assert ids(made) == sorted(known)
+    assert made.asked_for == {made.track.id}
+    assert not refused
+
+
 def test_a_bad_box_to_add_is_refused_and_the_rest_goes_on() -> None:
     made, refused, _ = session()
     made.choose(lambda _: FIRST.box)

@@ -248,8 +248,10 @@ class Session:
 
     def configure(self, variant: str, parameters: Parameters) -> None:
         """Use another tracker or other parameters, as soon as no hidden target would be lost."""
+        if self._wanted == (variant, parameters):
+            return
         self._wanted = (variant, parameters)
-        if self.track.state is TrackState.IDLE and not self._added:
+        if not self.following:
             self._renew()
 
     # -- starting ---------------------------------------------------------------------------------
@@ -335,7 +337,7 @@ class Session:
 
         Alone, it starts with nothing remembered; among others, with what is known of all.
         """
-        among = (self._added or self._targets.everyone) and self._current
+        among = self._added or self._targets.everyone
         targets = self._targets if among else TargetSet(*self._wanted)
         try:
             inner = targets.add(frame, box)
@@ -391,7 +393,7 @@ class Session:
                 return self.track
         if not others and self.track.state is not TrackState.IDLE:
             self._update(frame)
-        if self._chosen is not None or self._added:
+        if self.following:
             self._take_over(frame)
         return self.track
 
@@ -409,28 +411,33 @@ class Session:
         self._story.follow(self.track, frame.stamp_ns)
 
     def _take_over(self, frame: Frame) -> None:
-        """Go over to what is wanted, with every target that is seen, once the chosen one is."""
+        """Go over to what is wanted, with all who are seen, once the chosen one is."""
         if self._current:
             return
         if self._chosen is not None and not _shown(self.track, frame):
             return
-        known = self._known() | {self.track.id}
+        asked = self.asked_for
         targets = TargetSet(*self._wanted)
+        everyone = self._everyone and targets.metric is not None
         ids: dict[int, int] = {}
         try:
             for track in (self.track, *self.others):
-                if track.id in known and track.box is not None and _shown(track, frame):
+                wanted = everyone or track.id in asked
+                if wanted and track.box is not None and _shown(track, frame):
                     ids.setdefault(targets.add(frame, track.box), track.id)
         except RgbdKcfError as error:
             self._report(str(error))
             self._wanted = (self._variant, self._parameters)
             return
+        for inner, number in ids.items():
+            if number not in asked:  # known from now on, by that id, and followed with everyone
+                targets.remove(inner)
         track, others = self.track, self.others
         chosen = self._chosen is not None
         self._replace(targets)
         self._ids = ids
-        inner = list(ids)
-        self._chosen, self._added = (inner[0], inner[1:]) if chosen else (None, inner)
+        kept = [inner for inner, number in ids.items() if number in asked]
+        self._chosen, self._added = (kept[0], kept[1:]) if chosen else (None, kept)
         self.track, self.others = track, others
 
 
