@@ -231,6 +231,30 @@ def test_the_same_message_again_is_dropped_and_counted() -> None:
     assert counts['duplicates'] + counts['repeated'] == 2
 
 
+@pytest.mark.parametrize('stamp', [0, BASE])
+def test_a_picture_that_stands_still_without_a_clock_is_answered(stamp: int) -> None:
+    made = intake()
+    captures = []
+    for index in range(60):
+        now = BASE + index * 33 * MS
+        captures += made.color(message(stamp, b'c'), now)
+        captures += made.depth(message(stamp, b'd'), now + 4 * MS)
+        captures += made.poll(now + 10 * MS)
+    assert len(captures) > 50
+    assert all(c.depth is not None for c in captures)
+
+
+def test_copies_are_dropped_for_as_long_as_stamps_go_on() -> None:
+    made = intake()
+    captures = []
+    for index in range(30):
+        now = BASE + index * 33 * MS
+        for late in (0, 20 * MS):
+            captures += made.color(message(now), now + late)
+            captures += made.depth(message(now), now + late + MS)
+    assert len(captures) == 30
+
+
 def test_a_stamp_far_in_the_future_loses_no_other_image() -> None:
     made = intake()
     captures = []

@@ -23,6 +23,9 @@ LARGEST_STEP_NS = 60 * NANOSECONDS
 """A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
 LEAST_STEP_NS = 1_000_000
 """Time goes on by this much at the least where a stamp does not."""
+COPY_NS = 200_000_000
+"""Copies of a message come within this time; the same picture later on, still of the same stamp,
+is one that stands still before a camera without a clock."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +84,7 @@ class StampRepair:
 
     def __init__(self) -> None:
         self._stamp: int | None = None
+        self._since = 0  # when the first of that stamp came
         self._repaired = 0
         self._arrival = 0
         self._data: Any = None
@@ -89,9 +93,11 @@ class StampRepair:
         """The stamp to pair by; None where the message is the last one over again."""
         repaired = stamp_ns
         if stamp_ns == self._stamp:
-            if _same(data, self._data):
+            if arrival_ns - self._since < COPY_NS and _same(data, self._data):
                 return None
             repaired = self._repaired + max(arrival_ns - self._arrival, 1)
+        else:
+            self._since = arrival_ns
         self._stamp, self._data = stamp_ns, data
         self._repaired, self._arrival = repaired, arrival_ns
         return repaired
