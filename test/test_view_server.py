@@ -349,6 +349,9 @@ FORM = b'POST /login HTTP/1.1\r\nHost: HERE\r\nOrigin: http://HERE\r\n'
         b'Content-Length: 7\r\n\r\ntoken=x',
         FORM + b'Content-Type: application/x-www-form-urlencoded\r\nContent-Encoding: gzip\r\n'
         b'Content-Length: 7\r\n\r\ntoken=x',
+        FORM + b'Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 95\r\n\r\n--x\r\n'
+        b'Content-Disposition: form-data; name="token"\r\nContent-Transfer-Encoding: odd\r\n\r\n'
+        b'a\r\n--x--\r\n',
     ],
 )
 def test_a_request_that_is_garbage_is_no_error_of_ours(server: Server, request_: bytes) -> None:
@@ -380,6 +383,27 @@ def test_the_end_waits_for_no_browser_that_sleeps(server: Server) -> None:
         begun = time.monotonic()
         server.stop()
         assert time.monotonic() - begun < 8  # not the ten seconds that aiohttp would wait
+
+
+def test_the_end_waits_for_nobody_who_reads_slowly_or_sends_half_a_form(
+    server: Server, stub: Stub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stub, 'boxes_csv', lambda: 'id,frame\n' * 2_000_000)
+    host, _, port = server.url.split('/')[2].partition(':')
+    place = f'{host}:{port}'.encode()
+    kind = b'Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 1000\r\n\r\n'
+    with (
+        socket.create_connection((host, int(port)), 20) as slow,
+        socket.create_connection((host, int(port)), 20) as half,
+    ):
+        slow.sendall(b'GET /boxes.csv HTTP/1.1\r\nHost: HERE\r\n\r\n'.replace(b'HERE', place))
+        assert b' 200 ' in slow.recv(100)
+        half.sendall((FORM + kind + b'token=').replace(b'HERE', place))
+        time.sleep(0.2)  # until it is being read
+        begun = time.monotonic()
+        server.stop()
+        assert time.monotonic() - begun < 3
+        assert not asyncio.all_tasks(server._loop)
 
 
 def test_the_same_trouble_is_told_once(server: Server, caplog: pytest.LogCaptureFixture) -> None:

@@ -45,7 +45,8 @@ COMMANDS_S = 60
 ACK_S = 10.0
 """Longest wait for a browser to have drawn a moment; one that sleeps longer is let go."""
 CLOSE_S = 1.0
-"""Longest wait at the end for browsers to close their sockets: those that sleep never do."""
+"""Longest wait at the end for browsers to close their sockets, which those that sleep never do, and
+for what is being answered."""
 COMPLAINT_S = 60.0
 """Between two words about the same trouble in the log."""
 COOKIE = 'rgbd_kcf_view'
@@ -123,7 +124,7 @@ class Server:
         self._session = secrets.token_urlsafe(32)
         self._loop = asyncio.new_event_loop()
         self._thread: threading.Thread | None = None
-        self._sockets: dict[web.WebSocketResponse, asyncio.Transport | None] = {}
+        self._sockets: set[web.WebSocketResponse] = set()
         self._wrong = asyncio.Lock()
         self.url = ''
 
@@ -190,10 +191,17 @@ class Server:
         closing = asyncio.gather(*(c.close() for c in self._sockets), return_exceptions=True)
         with contextlib.suppress(asyncio.TimeoutError):
             await asyncio.wait_for(closing, CLOSE_S)
-        for transport in self._sockets.values():  # of those that sleep
-            if transport is not None:
-                transport.abort()
-        await self._runner.cleanup()
+        assert self._runner.server is not None
+        # Of those that sleep, read slowly, or have not sent all of a form.
+        for connection in self._runner.server.connections:
+            if connection.transport is not None:
+                connection.transport.abort()
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._runner.cleanup(), CLOSE_S)
+        left = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in left:
+            task.cancel()
+        await asyncio.gather(*left, return_exceptions=True)
 
     # -- who may ----------------------------------------------------------------------------------
 
@@ -244,7 +252,8 @@ class Server:
             form = await asyncio.wait_for(request.post(), FORM_S)
         except asyncio.TimeoutError:
             raise web.HTTPRequestTimeout from None
-        except (ValueError, LookupError, web.RequestPayloadError):
+        # A RuntimeError: a transfer encoding that aiohttp does not know.
+        except (ValueError, LookupError, RuntimeError, web.RequestPayloadError):
             raise web.HTTPBadRequest from None
         if self._wrong.locked():  # or who asks often enough at once would not have to wait
             raise web.HTTPTooManyRequests(text='A wrong token was just given: try again')
@@ -283,12 +292,12 @@ class Server:
         connected = web.WebSocketResponse(
             max_msg_size=LARGEST_MESSAGE, heartbeat=20, compress=False
         )
-        self._sockets[connected] = request.transport
+        self._sockets.add(connected)
         try:
             await connected.prepare(request)
             await self._converse(connected)
         finally:
-            del self._sockets[connected]
+            self._sockets.discard(connected)
         return connected
 
     async def _converse(self, connected: web.WebSocketResponse) -> None:
