@@ -10,6 +10,7 @@ import io
 import struct
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
@@ -28,6 +29,7 @@ from rgbd_kcf_tracker.insight import Insight, insight_of
 from rgbd_kcf_tracker.metric.decide.evidence import OTHER_PLACES, SUREST
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
+from rgbd_kcf_tracker.view import player as module
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.export import export
 from rgbd_kcf_tracker.view.player import Player
@@ -377,6 +379,32 @@ def test_a_parameter_makes_the_run_go_on_from_the_frame_shown() -> None:
     last = [tracker.update(frame) for frame in frames][-1]
     assert_same(rig.ask('seek', frame=12)['targets'][0], last)
     assert rig.ask('defaults')['values']['depth_threshold'] == 0.15
+
+
+def test_a_parameter_of_a_hidden_target_tells_how_far_it_is_and_holds_no_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(variant='kcf')
+    rig.ask('seek', frame=12)
+
+    def hide() -> None:
+        for number in range(4, 13):
+            tracks = rig.player._passed[number].tracks
+            tracks.update({key: replace(track, box=None) for key, track in tracks.items()})
+
+    hide()
+    monkeypatch.setattr(module, 'BUSY_S', -1.0)
+    told: list[tuple[int, str]] = []
+    monkeypatch.setattr(
+        rig.player, '_show', lambda: told.append((rig.player._shown, rig.player._busy))
+    )
+    rig.ask('parameter', name='padding', value=1.0)
+    assert told == [(at, f'tracking up to frame 12: at {at}') for at in range(3, 12)] + [(12, '')]
+    told.clear()
+    hide()
+    rig.player.stop()
+    rig.ask('parameter', name='padding', value=1.5)
+    assert len(told) == 2
 
 
 def test_the_last_minute_ends_at_the_frame_shown() -> None:

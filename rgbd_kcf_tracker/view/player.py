@@ -39,6 +39,8 @@ from rgbd_kcf_tracker.view.targets import PageTargets, follows_everyone
 SPEEDS = (0.1, 8.0)
 SHOWN_HZ = 20.0
 """Moments put up each second at most; every frame is tracked all the same."""
+BUSY_S = 0.5
+"""Between two words about how far it is where many frames are tracked at once."""
 STAGES = ('read', 'track', 'show')
 """What a moment takes its time for."""
 WARM_UP = 30
@@ -124,6 +126,7 @@ class Player:
         self._put_up = 0.0
         self._word = ''
         self._busy = ''
+        self._told = 0.0
         self._timing: dict[str, float] = {}
 
     # -- what the page asks -----------------------------------------------------------------------
@@ -215,7 +218,7 @@ class Player:
             self._say(f'internal error: {type(error).__name__}: {error}')
 
     def _say(self, word: str) -> None:
-        self._word = word
+        self._word, self._busy = word, ''
         self._show()
         self._word = ''
 
@@ -286,18 +289,12 @@ class Player:
         wanted = min(max(wanted, 0), len(self._recording) - 1)
         anew = wanted != self._shown + 1
         if (len(self._targets) or self._everyone) and wanted > self._front:
-            begun = time.monotonic()
+            self._told = time.monotonic()
             for number in range(self._front + 1, wanted + 1):
                 self._track(number, self._read(number))
-                # The last one is shown when its figures are on the board too.
-                if number < wanted and time.monotonic() - begun > 0.5:
-                    begun = time.monotonic()
-                    self._busy = f'tracking up to frame {wanted}: at {number}'
-                    self._shown = number
-                    self._show()
-                    if self._interrupted():
-                        wanted = number
-                        break
+                if self._told_of(number, wanted) and self._interrupted():
+                    wanted = number
+                    break
             self._busy = ''
             self._shown = wanted
         else:
@@ -311,6 +308,17 @@ class Player:
             self.board.rewind(self._history())
         elif self._shown in self._passed:
             self.board.note(self._passed[self._shown].entry)
+
+    def _told_of(self, number: int, wanted: int) -> bool:
+        """Show now and then a frame on the way to another; whether it was shown now."""
+        # The last one is shown when its figures are on the board too.
+        if number >= wanted or time.monotonic() - self._told <= BUSY_S:
+            return False
+        self._told = time.monotonic()
+        self._busy = f'tracking up to frame {wanted}: at {number}'
+        self._shown = number
+        self._show()
+        return True
 
     def _interrupted(self) -> bool:
         return self._stopping.is_set() or not self._commands.empty()
@@ -469,6 +477,7 @@ class Player:
         self._known.clear()
         begin = min([warm, *starts.values()])
         tracks: dict[int, Track] = {}
+        self._told = time.monotonic()
         for at in range(begin, number + 1) if starts or self._everyone else ():
             frame = self._read(at)
             tracks = self._targets.update(frame)
@@ -481,6 +490,9 @@ class Player:
                 self._passed[at].tracks.update(tracks)
             self._insights = dict(self._targets.insights())
             self._remember(frame, tracks)
+            if self._told_of(at, number) and self._stopping.is_set():
+                return
+        self._busy, self._shown = '', number
         if number in self._passed:
             passed = self._passed[number]
             passed.tracks, passed.chosen = tracks, self._targets.chosen
