@@ -91,7 +91,7 @@ class Parameters:
         for info in describe(type(self)):
             object.__setattr__(self, info.name, checked(info, getattr(self, info.name)))
 
-    def replace(self: T, **changes: Scalar) -> T:
+    def replace(self: T, /, **changes: Scalar) -> T:
         """A copy with some values changed, checked again.
 
         Raises:

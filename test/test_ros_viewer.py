@@ -358,6 +358,7 @@ def test_what_a_command_sets() -> None:
         Command('variant', {'name': 'mosse'}),
         Command('parameter', {'name': 'padding', 'value': 'wide'}),
         Command('parameter', {'name': 'colour', 'value': 1}),
+        Command('parameter', {'name': 'self', 'value': 1}),
     ):
         with pytest.raises(ParameterError):
             node_parameter(bad, 'kcf')
