@@ -28,6 +28,7 @@ import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from ros_rig import Rig, overrides, play_hidden, running_node, scene
+from sensor_msgs.msg import CameraInfo
 
 from rgbd_kcf_tracker import Box, Frame, Track, TrackState
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
@@ -291,6 +292,7 @@ def test_of_a_box_from_the_page_the_part_in_the_picture_is_asked_for() -> None:
     with running_viewer() as (node, _):
         asked: list[Any] = []
         node._add.publish = asked.append
+        node._add.get_subscription_count = lambda: 1
 
         def box(*values: float) -> Command:
             return Command('box', dict(zip(('x', 'y', 'width', 'height'), values, strict=True)))
@@ -306,6 +308,32 @@ def test_of_a_box_from_the_page_the_part_in_the_picture_is_asked_for() -> None:
         for values in ((-30, 10, 20, 40), (400, 10, 20, 40)):
             with pytest.raises(ParameterError, match='outside the picture'):
                 node._carry_out(box(*values))
+
+
+@pytest.mark.usefixtures('rig')
+def test_what_no_tracker_hears_is_said() -> None:
+    with running_viewer(tracker='nobody') as (node, _):
+        node.page.image(Frame(np.zeros((240, 320, 3), np.uint8)), 1)
+        node.page.answer(1, [Track(Box(5, 6, 7, 8), TrackState.TRACKING, id=1)])
+        for command in (
+            Command('box', {'x': 5, 'y': 6, 'width': 7, 'height': 8}),
+            Command('follow', {'id': 1}),
+            Command('remove', {'id': 1}),
+            Command('everyone', {'value': True}),
+        ):
+            with pytest.raises(ParameterError, match='/nobody does not answer: is it running'):
+                node._carry_out(command)
+
+
+@pytest.mark.usefixtures('rig')
+@pytest.mark.parametrize(('rectified', 'focal'), [('auto', 300.0), ('yes', 280.0)])
+def test_the_room_has_the_camera_that_the_tracker_is_told_of(rectified: str, focal: float) -> None:
+    k = [300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0]
+    p = [280.0, 0.0, 160.0, 0.0, 0.0, 280.0, 120.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    with running_viewer(color_rectified=rectified) as (node, _):
+        node._on_info(CameraInfo(width=320, height=240, k=k, p=p))
+        assert node._camera is not None
+        assert node._camera.intrinsics.fx == focal
 
 
 def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:

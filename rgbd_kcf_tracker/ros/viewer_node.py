@@ -123,7 +123,9 @@ class ViewerNode(Node):
 
     def _on_info(self, message: CameraInfo) -> None:
         try:
-            camera = camera_from_info(message, self.resolve_topic_name(COLOR))
+            camera = camera_from_info(
+                message, self.resolve_topic_name(COLOR), self.settings.color_rectified
+            )
         except RgbdKcfError:
             return
         if camera is not None:
@@ -238,21 +240,19 @@ class ViewerNode(Node):
         values = command.values
         if command.do == 'box':
             box = Box(*(values[name] for name in ('x', 'y', 'width', 'height')))
-            self._add.publish(self._region(box))
+            self._request(self._add, self._region(box))
         elif command.do == 'point':
             if self.page.frame is None:
                 raise ParameterError('no picture has come yet')
             box = target_at(self.page.frame, values['x'], values['y'])
-            self._add.publish(self._region(box))
+            self._request(self._add, self._region(box))
         elif command.do == 'follow':
             # A new choice of one who is followed already keeps its id.
-            self._init.publish(self._region(self.page.box_of(values['id'])))
+            self._request(self._init, self._region(self.page.box_of(values['id'])))
         elif command.do == 'remove':
-            if not self._remove.get_subscription_count():
-                raise ParameterError(f'{self._tracker} does not answer: is it running?')
             if not 0 <= values['id'] < 2**32:
                 raise ParameterError(f'there is no target {values["id"]}')
-            self._remove.publish(UInt32(data=values['id']))
+            self._request(self._remove, UInt32(data=values['id']))
         elif command.do == 'rename':
             self.page.rename(values['id'], values['name'])
         elif command.do == 'everyone':
@@ -286,9 +286,17 @@ class ViewerNode(Node):
             raise ParameterError('that box lies outside the picture')
         return region
 
-    def _set(self, parameters: list[Parameter]) -> None:
-        if not self._remote.services_are_ready():
+    def _request(self, publisher: Any, message: Any) -> None:
+        self._require(publisher.get_subscription_count() > 0)
+        publisher.publish(message)
+
+    def _require(self, heard: bool) -> None:
+        """Say on the page that nobody hears what is asked there."""
+        if not heard:
             raise ParameterError(f'{self._tracker} does not answer: is it running?')
+
+    def _set(self, parameters: list[Parameter]) -> None:
+        self._require(self._remote.services_are_ready())
         self._remote.set_parameters(parameters, callback=self._was_set)
 
     def _was_set(self, future: Any) -> None:

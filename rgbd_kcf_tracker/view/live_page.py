@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.insight import Insight, KnownView
 from rgbd_kcf_tracker.live.settings import COMPRESSED, COMPRESSED_DEPTH, RAW
 from rgbd_kcf_tracker.live.timeline import Timeline
 from rgbd_kcf_tracker.parameters import Parameters, parameter
+from rgbd_kcf_tracker.recordings.camera_info import AUTO, RECTIFIED
 from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.recordings.results import HEADER, row
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -71,6 +72,13 @@ class ViewerParameters(Parameters):
         'How depth images arrive.',
         choices=(RAW, COMPRESSED, COMPRESSED_DEPTH),
         source='image_transport',
+    )
+    color_rectified: str = parameter(
+        AUTO,
+        'Whether the colour images are rectified: what the tracker is told, or the room and clicks '
+        'in it are of another camera.',
+        choices=RECTIFIED,
+        source='sensor_msgs/CameraInfo',
     )
 
 
