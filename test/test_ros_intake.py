@@ -228,7 +228,7 @@ def test_the_same_message_again_is_dropped_and_counted() -> None:
         captures += made.depth(message(BASE), 0)
     assert len(captures) == 1
     counts = made._statistics.snapshot().counts
-    assert counts['duplicates'] + counts['repeated'] == 2
+    assert counts['duplicates'] == 2
 
 
 @pytest.mark.parametrize('stamp', [0, BASE])
@@ -253,6 +253,19 @@ def test_copies_are_dropped_for_as_long_as_stamps_go_on() -> None:
             captures += made.color(message(now), now + late)
             captures += made.depth(message(now), now + late + MS)
     assert len(captures) == 30
+
+
+def test_counts_go_on_when_the_node_is_activated_again() -> None:
+    statistics = Statistics()
+    for activation in (0, 1):
+        made = Intake(
+            statistics, tolerance_s=0.02, depth_wait_s=0.1, camera_info_wait_s=0.0, patient=False
+        )
+        for index in (10, 11, 12, 5, 6, 13):
+            stamp = BASE + (activation * 100 + index) * 33 * MS
+            made.color(message(stamp), stamp)
+            made.depth(message(stamp), stamp)
+        assert statistics.snapshot().counts['late'] == 2 * activation + 2
 
 
 def test_a_stamp_far_in_the_future_loses_no_other_image() -> None:

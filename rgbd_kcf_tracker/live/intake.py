@@ -11,7 +11,7 @@ the first ones wait for the camera_info that comes with them.
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from typing import Any
 
 from rgbd_kcf_tracker.live.processor import Capture
@@ -132,6 +132,7 @@ class Intake:
         self._info_wait_ns = round(camera_info_wait_s * 1e9)
         self._patient = patient
         self._repair_color, self._repair_depth = StampRepair(), StampRepair()
+        self._counted: Counter[str] = Counter()
         self._arrivals: dict[int, int] = {}
         self._held: deque[Capture] = deque()
         self._hold_from: int | None = None
@@ -217,9 +218,14 @@ class Intake:
             captures.append(Capture(pair.color, pair.depth, self._camera, now_ns))
         self._forget_lost()
         counts = self._pairer.counts
-        self._statistics.set('late', counts.late)
-        self._statistics.set('repeated', counts.duplicates)
-        self._statistics.set('depth_without_color', counts.depth_alone)
+        for name, number in (
+            ('late', counts.late),
+            ('repeated', counts.duplicates),
+            ('depth_without_color', counts.depth_alone),
+        ):
+            # The pairer counts from this activation on, the statistics all of them.
+            self._statistics.count(name, number - self._counted[name])
+            self._counted[name] = number
         if pairs:
             self._statistics.count('pairs', len(pairs))
         return self._hold(captures, now_ns) if self._holding else captures
