@@ -18,7 +18,7 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.live.intake import Intake
 from rgbd_kcf_tracker.live.session import Session
-from rgbd_kcf_tracker.live.statistics import Statistics
+from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import Timeline
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import Camera
@@ -266,6 +266,15 @@ def test_counts_go_on_when_the_node_is_activated_again() -> None:
             made.color(message(stamp), stamp)
             made.depth(message(stamp), stamp)
         assert statistics.snapshot().counts['late'] == 2 * activation + 2
+
+
+@pytest.mark.parametrize(('latency', 'told'), [(-500, True), (-2000, False), (3.6e6, False)])
+def test_a_latency_by_clocks_that_differ_is_left_out(latency: float, told: bool) -> None:
+    statistics = Statistics()
+    statistics.processed(Times(latency, 9.0, latency - 9.0, 1.0, 1.0, 6.0, 1.0))
+    times = statistics.snapshot().times_ms
+    assert bool(times['latency']) == bool(times['transport']) == told
+    assert times['work'] == (9.0, 9.0, 9.0, 9.0)
 
 
 def test_a_stamp_far_in_the_future_loses_no_other_image() -> None:
