@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -29,13 +30,18 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from ros_rig import Rig, overrides, play_hidden, running_node, scene
 from sensor_msgs.msg import CameraInfo
+from std_msgs.msg import Header
 
 from rgbd_kcf_tracker import Box, Frame, Track, TrackState
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.insight import Considered, Insight, KnownView
 from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
+from rgbd_kcf_tracker.recordings.messages import stamp_of
+from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
+from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message, stamp_from_ns
 from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
+from rgbd_kcf_tracker.view import live_page
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.live_page import LivePage, node_parameter
 from rgbd_kcf_tracker.view.server import Server
@@ -44,25 +50,33 @@ pytestmark = [pytest.mark.ros, pytest.mark.timeout(180)]
 
 
 @contextmanager
-def running_viewer(**values: Any) -> Iterator[tuple[ViewerNode, Server]]:
+def made_viewer(**values: Any) -> Iterator[ViewerNode]:
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
     node = ViewerNode(context=context, parameter_overrides=overrides({'rate': 60.0, **values}))
-    server = Server(node.page, port=0)
-    server.start()
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    stop = threading.Event()
-    thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
-    thread.start()
     try:
-        yield node, server
+        yield node
     finally:
-        server.stop()
-        stop.set()
-        thread.join(5)
         node.destroy_node()
         rclpy.shutdown(context=context)
+
+
+@contextmanager
+def running_viewer(**values: Any) -> Iterator[tuple[ViewerNode, Server]]:
+    with made_viewer(**values) as node:
+        server = Server(node.page, port=0)
+        server.start()
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        stop = threading.Event()
+        thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
+        thread.start()
+        try:
+            yield node, server
+        finally:
+            server.stop()
+            stop.set()
+            thread.join(5)
 
 
 class Look:
@@ -312,7 +326,7 @@ def test_of_a_box_from_the_page_the_part_in_the_picture_is_asked_for() -> None:
 
 @pytest.mark.usefixtures('rig')
 def test_what_no_tracker_hears_is_said() -> None:
-    with running_viewer(tracker='nobody') as (node, _):
+    with made_viewer(tracker='nobody') as node:
         node.page.image(Frame(np.zeros((240, 320, 3), np.uint8)), 1)
         node.page.answer(1, [Track(Box(5, 6, 7, 8), TrackState.TRACKING, id=1)])
         for command in (
@@ -330,10 +344,50 @@ def test_what_no_tracker_hears_is_said() -> None:
 def test_the_room_has_the_camera_that_the_tracker_is_told_of(rectified: str, focal: float) -> None:
     k = [300.0, 0.0, 160.0, 0.0, 300.0, 120.0, 0.0, 0.0, 1.0]
     p = [280.0, 0.0, 160.0, 0.0, 0.0, 280.0, 120.0, 0.0, 0.0, 0.0, 1.0, 0.0]
-    with running_viewer(color_rectified=rectified) as (node, _):
+    with made_viewer(color_rectified=rectified) as node:
         node._on_info(CameraInfo(width=320, height=240, k=k, p=p))
         assert node._camera is not None
         assert node._camera.intrinsics.fx == focal
+
+
+@pytest.mark.usefixtures('rig')
+@pytest.mark.parametrize('answers_after', [None, 0, 1, 3])
+def test_images_are_shown_as_they_come(
+    answers_after: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With nobody who answers, and with a tracker that answers so many images later."""
+    with made_viewer() as node:
+        node.page.board.watch(lambda: None)
+        shown: list[tuple[int, bool]] = []
+        monkeypatch.setattr(  # due at any time
+            node.page, 'image', lambda frame, stamp: shown.append((stamp, frame.depth is not None))
+        )
+        color, depth, _ = scene(0)
+        headers = [Header(stamp=stamp_from_ns(number * 16_000_000)) for number in range(1, 21)]
+        for number, header in enumerate(headers):
+            node._on_color(image_message(header, color, 'bgr8'))
+            node._on_depth(image_message(header, depth, '16UC1'))
+            if answers_after is not None and number >= answers_after:
+                node._on_state(TrackMessages(ROS_TYPES).state(headers[number - answers_after], []))
+        stamps = [stamp_of(SimpleNamespace(header=header)) for header in headers]
+        answered = stamps[: len(stamps) - (answers_after or 0)]
+        assert shown[-15:] == [(stamp, True) for stamp in answered][-15:]
+
+
+@pytest.mark.parametrize(('rate', 'expected'), [(10, 10), (20, 20), (60, 30)])
+def test_the_rate_that_is_asked_for_is_reached(
+    rate: float, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, shown = [1000.0], 0
+    monkeypatch.setattr(live_page.time, 'monotonic', lambda: clock[0])
+    page = LivePage('tracker', rate)
+    page.board.watch(lambda: None)
+    for number in range(300):  # ten seconds of a camera at 30 Hz, not quite in time
+        clock[0] = 1000 + number / 30 - (0.003 if number % 2 else 0)
+        if page.due():
+            page.image(Frame(np.zeros((12, 16, 3), np.uint8)), number)
+            shown += 1
+    assert abs(shown - 10 * expected) <= 2
 
 
 def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:

@@ -64,7 +64,7 @@ PAIR_NS = round(DEFAULT_TOLERANCE_S * 1e9)
 for no pair to be sure, as a :class:`StampPairer` does."""
 _MAKE = TrackMessages(ROS_TYPES)
 HELD = 6
-"""Images that are kept for their partner."""
+"""Images that are kept for their partner and their answer."""
 
 
 class ViewerNode(Node):
@@ -111,10 +111,12 @@ class ViewerNode(Node):
     def _on_state(self, message: DiagnosticArray) -> None:
         with suppress(RgbdKcfError):  # of somebody else's
             self.page.answer(stamp_of(message), tracks_of_state(message))
+        self._show_what_is_due()
 
     def _on_evidence(self, message: DiagnosticArray) -> None:
         with suppress(RgbdKcfError):  # of somebody else's
             self.page.evidence(stamp_of(message), evidence_of(message))
+        self._show_what_is_due()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -132,18 +134,18 @@ class ViewerNode(Node):
             self._camera = camera
 
     def _on_color(self, message: Any) -> None:
-        if self.page.due():
-            self._colors[stamp_of(message)] = message
-            self._thin(self._colors)
+        self._hold(self._colors, message)
+        if not self._depths:  # else its own comes, while that of the one before may be near enough
+            self._show_what_is_due()
 
     def _on_depth(self, message: Any) -> None:
-        if self.page.due():
-            self._depths[stamp_of(message)] = message
-            self._thin(self._depths)
+        self._hold(self._depths, message)
+        self._show_what_is_due()
 
     @staticmethod
-    def _thin(held: dict[int, Any]) -> None:
-        while len(held) > HELD:
+    def _hold(held: dict[int, Any], message: Any) -> None:
+        held[stamp_of(message)] = message
+        if len(held) > HELD:
             del held[next(iter(held))]
 
     # -- what is shown ----------------------------------------------------------------------------
@@ -159,8 +161,7 @@ class ViewerNode(Node):
                 self._carry_out(command)
             except RgbdKcfError as error:
                 self.page.say(str(error))
-        if self.page.due() and self._colors:
-            self._show()
+        self._show_what_is_due()
 
     def _listen_or_not(self) -> None:
         """Subscribe to what is large when somebody looks, and no more a while after all have gone.
@@ -197,6 +198,10 @@ class ViewerNode(Node):
             self.create_subscription(DiagnosticArray, self._evidence, self._on_evidence, LIGHT),
         ]
 
+    def _show_what_is_due(self) -> None:
+        if self._colors and self.page.due():
+            self._show()
+
     def _show(self) -> None:
         """The newest image that has its depth and its answer; the newest of all where none has."""
         paired = [s for s in self._colors if self._depth_of(s) is not None]
@@ -204,10 +209,14 @@ class ViewerNode(Node):
         if not answered and self.page.answering and len(self._colors) < HELD:
             return  # its answer may still come
         stamp = max(answered or paired or self._colors)
-        color, depth = self._colors[stamp], self._depth_of(stamp)
+        depth = self._depth_of(stamp)
         if depth is None and self._depths and len(self._colors) < HELD:
             return  # its depth may still come
-        self._colors.clear()
+        color = self._colors[stamp]
+        for held in list(self._colors):  # those that came later may be answered for the next moment
+            del self._colors[held]
+            if held == stamp:
+                break
         raw = self.settings.color_transport == RAW
         try:
             image = decode_color(color) if raw else decode_compressed_color(color)

@@ -136,7 +136,7 @@ class LivePage:
         self._lately = 0
         self._word = ''
         self._said = 0.0
-        self._shown_at = 0.0
+        self._due_at = 0.0
         self._names: OrderedDict[int, str] = OrderedDict()
 
     # -- what the page asks -----------------------------------------------------------------------
@@ -308,11 +308,12 @@ class LivePage:
 
     def due(self) -> bool:
         """Whether somebody looks and the next moment may be put up."""
-        return self.board.watched and time.monotonic() - self._shown_at >= self._period
+        return self.board.watched and time.monotonic() >= self._due_at
 
     def image(self, frame: Frame, stamp_ns: int) -> None:
         """Put up an image with the answer to it, or the last one before."""
-        self._shown_at = time.monotonic()
+        # What came late delays the next no more, or only halves, thirds of a rate were reached.
+        self._due_at = max(self._due_at + self._period, time.monotonic())
         self._frame = frame
         if self._pending is not None and self._pending[0] <= stamp_ns:
             self._settle()
