@@ -14,7 +14,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.ros.launching import CONFIG, a_file, declared, given, is_true
+from rgbd_kcf_tracker.ros.launching import CONFIG, a_file, declared, given, is_true, switches
 
 ARGUMENTS = {
     'follow_file': (
@@ -22,18 +22,18 @@ ARGUMENTS = {
         'Parameters of the Following Server and of the node that asks it.',
     ),
     'cmd_vel': ('cmd_vel', 'Topic of the velocities that the Following Server sends.'),
-    'automatic': ('true', 'false: wait for ~/start before the robot moves.'),
+    'automatic': ('', 'false: wait for ~/start before the robot moves; empty for follow_file.'),
     'server': ('true', 'false: a Following Server runs already, say with the rest of Nav2.'),
     'namespace': ('', 'Namespace of all nodes.'),
     'name': ('tracker', 'Name of the tracker node.'),
-    'use_sim_time': ('false', 'Take the time from /clock.'),
+    'use_sim_time': ('', 'true: take the time from /clock; empty for the files of parameters.'),
 }
 
 
 def start(context: LaunchContext) -> list:
     """The nodes, once the arguments are known."""
     values = given(ARGUMENTS, context)
-    common = {'use_sim_time': is_true(values, 'use_sim_time')}
+    common = switches(values, 'use_sim_time')
     namespace, file = values['namespace'], a_file(values, 'follow_file')
     actions = [
         IncludeLaunchDescription(
@@ -49,11 +49,7 @@ def start(context: LaunchContext) -> list:
             namespace=namespace,
             parameters=[
                 file,
-                {
-                    **common,
-                    'tracker': values['name'],
-                    'automatic': is_true(values, 'automatic'),
-                },
+                {'tracker': values['name'], **common, **switches(values, 'automatic')},
             ],
             output='screen',
         ),

@@ -9,6 +9,8 @@ The camera's own driver is started by its own launch file. To follow several tar
 several cameras, include this file once for each, with a ``namespace`` of its own.
 """
 
+from typing import Any
+
 from launch.actions import OpaqueFunction, SetEnvironmentVariable
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -24,6 +26,7 @@ from rgbd_kcf_tracker.ros.launching import (
     full_name,
     given,
     is_true,
+    switches,
 )
 
 ARGUMENTS = {
@@ -32,10 +35,10 @@ ARGUMENTS = {
     'variant': ('', 'Which tracker; empty for that of params_file.'),
     'init_box': ('', 'Target to start on, x,y,width,height; empty to wait for ~/init.'),
     'auto_init': ('', 'true: choose the nearest person; empty for params_file.'),
-    'autostart': ('true', 'false: wait for a lifecycle manager.'),
+    'autostart': ('', 'false: wait for a lifecycle manager; empty for params_file.'),
     'namespace': ('', 'Namespace of the node.'),
     'name': ('tracker', 'Name of the node.'),
-    'use_sim_time': ('false', 'Take the time from /clock.'),
+    'use_sim_time': ('', 'true: take the time from /clock; empty for params_file.'),
     'fastdds_profile': (
         '',
         "A Fast DDS profile; empty for the environment's, or else the package's own, which the "
@@ -49,10 +52,7 @@ def start(context: LaunchContext) -> list:
     """The node, once the arguments are known."""
     values = given(ARGUMENTS, context)
     profile, remappings = chosen_camera(values)
-    parameters = {
-        'use_sim_time': is_true(values, 'use_sim_time'),
-        'autostart': is_true(values, 'autostart'),
-    }
+    parameters: dict[str, Any] = switches(values, 'use_sim_time', 'autostart', 'auto_init')
     # Raw is not said, so that a file of parameters may say otherwise.
     transports = profile.transports(is_true(values, 'compressed'))
     parameters |= {name: how for name, how in transports.items() if how != RAW}
@@ -60,8 +60,6 @@ def start(context: LaunchContext) -> list:
         parameters['variant'] = values['variant']
     if values['init_box']:
         parameters['init_box'] = ParameterValue(values['init_box'], value_type=str)
-    if values['auto_init']:
-        parameters['auto_init'] = is_true(values, 'auto_init')
     actions = []
     if values['fastdds_profile']:
         dds = a_file(values, 'fastdds_profile')

@@ -32,9 +32,8 @@ def start(context: LaunchContext) -> list:
         'host': values['host'],
         'port': number(values, 'port', int),
         'rate': number(values, 'rate', float),
+        **profile.transports(is_true(values, 'compressed')),
     }
-    if is_true(values, 'compressed'):
-        parameters |= profile.transports(compressed=True)
     return [
         Node(
             package='rgbd_kcf_tracker',

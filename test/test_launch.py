@@ -194,10 +194,22 @@ def test_a_profile_may_say_how_its_images_arrive(launch_modules: None, tmp_path:
         'depth_transport: compressedDepth}',
         encoding='utf-8',
     )
-    node, _ = start_tracker(camera='far', cameras_file=str(path))
-    parameters = node.named['parameters'][1]
-    assert parameters['color_transport'] == 'compressed'
-    assert parameters['depth_transport'] == 'compressedDepth'
+    for file in ('tracker', 'viewer'):
+        (node,) = started(f'{file}.launch.py', camera='far', cameras_file=str(path))
+        parameters = node.named['parameters'][-1]
+        assert parameters['color_transport'] == 'compressed'
+        assert parameters['depth_transport'] == 'compressedDepth'
+
+
+def test_what_is_not_given_stays_as_the_file_has_it(launch_modules: None) -> None:
+    """Above all that a robot waits for ~/start; the dictionary comes after the file and wins."""
+    fixed = {'automatic', 'autostart', 'auto_init', 'use_sim_time'}
+    for file in ('tracker', 'follow'):
+        for action in started(f'{file}.launch.py'):
+            for given in action.named.get('parameters', [])[1:]:
+                assert not fixed & set(given)
+            passed = dict(action.named.get('launch_arguments', []))
+            assert not any(passed[name] for name in fixed & set(passed))
 
 
 def test_what_the_shipped_file_documents_is_taken(tmp_path: Path) -> None:

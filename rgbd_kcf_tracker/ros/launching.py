@@ -89,6 +89,15 @@ def is_true(values: Mapping[str, str], name: str) -> bool:
     raise ParameterError(f'launch argument {name} is {values[name]!r}: give true or false')
 
 
+def switches(values: Mapping[str, str], *names: str) -> dict[str, bool]:
+    """The yes/no parameters that were given: one left empty is as a file or the node has it.
+
+    Raises:
+        ParameterError: where one says neither yes nor no.
+    """
+    return {name: is_true(values, name) for name in names if values[name]}
+
+
 def number(values: Mapping[str, str], name: str, kind: type[N]) -> N:
     """The number that an argument gives, ``kind`` being int or float.
 
