@@ -185,8 +185,9 @@ class Server:
 
     def __init__(self) -> None:
         self.ready = True
-        self.refuse = self.late = False
+        self.refuse = self.late = self.mute = False
         self.goals: list[Any] = []
+        self.unanswered: list[tuple[Any, Handle, Future]] = []
         self.cancelled = 0
         self.active: Handle | None = None
         self.node: Any = None
@@ -206,7 +207,9 @@ class Server:
         assert goal.max_duration.sec >= 0
         self.goals.append(goal)
         answer, handle = Future(), Handle(self, not self.refuse)
-        if self.late:
+        if self.mute:
+            self.unanswered.append((goal, handle, answer))
+        elif self.late:
             self.node.create_timer(0.2, lambda: self.accept(goal, handle, answer))
         else:
             self.accept(goal, handle, answer)
@@ -378,6 +381,61 @@ def test_a_goal_that_is_accepted_while_the_node_ends_is_taken_back() -> None:
         tracker.until(lambda: bool(server.goals), seen=True)
     assert server.cancelled == 1
     assert server.active is None
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(120)
+def test_a_server_that_died_is_asked_again_when_it_is_back() -> None:
+    """Neither answer nor result of a dead server ever comes: its futures stay pending."""
+    from std_msgs.msg import Bool
+    from std_srvs.srv import Trigger
+
+    server = Server()
+    with running(server, retry_after=0.3) as (node, camera):
+        tracker = FakeTracker(camera)
+        tracker.until(lambda: server.active is not None, seen=True)
+        server.ready, server.active = False, None
+        tracker.until(lambda: not node.active, seen=True)
+        start = camera.create_client(Trigger, '/follow/start')
+        tracker.until(start.service_is_ready, seen=True)
+        answer = start.call(Trigger.Request(), timeout_sec=10)
+        assert answer.message == 'not yet: no server has follow_object'
+        assert server.cancelled == 0
+        # It may have been the way to it alone, and it drives on: that goal is cancelled first.
+        server.ready = True
+        tracker.until(lambda: server.active is not None, seen=True)
+        assert server.cancelled == 1
+        # One that is back before DDS noticed that the first one died.
+        camera.create_publisher(Bool, '/follow_object/_action/status', 1)
+        tracker.until(lambda: server.cancelled == 2, seen=True)
+        tracker.until(lambda: server.active is not None, seen=True)
+        # Before it answered.
+        server.mute = True
+        server.end(server.active, FAILED_TO_DETECT_OBJECT, 'Failed object detection')
+        tracker.until(lambda: bool(server.unanswered), seen=True)
+        server.ready = False
+        tracker.until(lambda: not node.active, seen=True)
+        server.ready, server.mute = True, False
+        tracker.until(lambda: server.active is not None, seen=True)
+        server.unanswered.clear()
+    assert server.active is None
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(120)
+def test_a_goal_that_is_accepted_too_late_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
+    from rgbd_kcf_tracker.ros import follow_node
+
+    monkeypatch.setattr(follow_node, 'ASKING_S', 0.3)
+    server = Server()
+    server.mute = True
+    with running(server, retry_after=0.2) as (node, camera):
+        tracker = FakeTracker(camera)
+        tracker.until(lambda: len(server.unanswered) == 2, seen=True)
+        node.create_timer(0.0, lambda: server.accept(*server.unanswered[0]))
+        tracker.until(lambda: server.cancelled == 1, seen=True)
+        assert server.active is None
 
 
 def test_without_the_action_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,8 @@ from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
 
 PERIOD_S = 0.1
 SAY_AGAIN_S = 10.0
+ASKING_S = 5.0
+"""Seconds for which the server may think about a goal."""
 ANSWER_S = 0.5
 """Seconds for which a node that ends waits to be told whether its goal was accepted."""
 HOMES = ('nav2_msgs.action', 'opennav_following_msgs.action')
@@ -83,8 +85,13 @@ class FollowNode(Node):
         full_name(self, 'action', self.settings.action, '/follow_object')
         self._type = action_type() if action is None else action
         self._client = client(self, self._type, self.settings.action)
+        self._status_topic = self.resolve_topic_name(f'{self.settings.action}/_action/status')
+        self._servers: frozenset[tuple[int, ...]] = frozenset()
         self._goal: Any = None
+        self._revoked: Any = None
         self._asking: Any = None
+        self._asked_at = 0.0
+        self._unanswered: set[Any] = set()
         self._said: tuple[str, float] = '', 0.0
         self._hidden = False
         light = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -111,6 +118,8 @@ class FollowNode(Node):
     def _start(self, request: Any, response: Any) -> Any:
         self.following.asked = True
         reason = self.following.reason_to_stop(time.monotonic())
+        if not reason and not self._client.server_is_ready():
+            reason = f'no server has {self.settings.action}'
         response.success = True
         response.message = f'not yet: {reason}' if reason else 'following'
         return response
@@ -125,11 +134,27 @@ class FollowNode(Node):
 
     def _tick(self) -> None:
         now = time.monotonic()
+        ready = self._client.server_is_ready()
+        if self.active and not (ready and self._servers == self._servers_now()):
+            # Neither its answer nor its result would ever come. If only the way to it was cut, it
+            # may drive still: it is told to stop when it is back.
+            self._revoked = self._goal
+            self._ended('the server is gone')
+        elif self._asking is not None and now - self._asked_at > ASKING_S:
+            self._ended(f'the server has not answered for {ASKING_S:g} s')
+        if self._revoked is not None and ready:
+            self._revoked.cancel_goal_async()
+            self._revoked = None
         reason = self.following.reason_to_stop(now)
         if self._goal is not None and reason:
             self._cancel(reason)
         elif not self.active and self.following.to_begin(now):
             self._begin()
+
+    def _servers_now(self) -> frozenset[tuple[int, ...]]:
+        """Who has the action: of a server that died, DDS knows for seconds after it came back."""
+        infos = self.get_publishers_info_by_topic(self._status_topic)
+        return frozenset(tuple(info.endpoint_gid) for info in infos)
 
     def _begin(self) -> None:
         if not self._client.server_is_ready():
@@ -139,16 +164,25 @@ class FollowNode(Node):
         goal.pose_topic = self.pose_topic
         seconds = self.settings.max_duration
         goal.max_duration = Duration(sec=int(seconds), nanosec=int(seconds % 1 * 1e9))
+        self._servers, self._asked_at = self._servers_now(), time.monotonic()
         self._asking = self._client.send_goal_async(goal)
+        self._unanswered.add(self._asking)
         self._asking.add_done_callback(self._answered)
 
     def _answered(self, future: Any) -> None:
-        self._asking = None
+        self._unanswered.discard(future)
+        late = future is not self._asking
         try:
             goal = future.result()
         except Exception as error:  # rclpy has no common class for what a server can do
-            self._ended(f'the action server failed: {error}')
+            if not late:
+                self._ended(f'the action server failed: {error}')
             return
+        if late:
+            if goal.accepted:  # nobody would stop it
+                goal.cancel_goal_async()
+            return
+        self._asking = None
         if not goal.accepted:
             self._ended('the action server refused to follow')
             return
@@ -175,7 +209,7 @@ class FollowNode(Node):
         # The target may be seen again at once: then it is followed at once.
 
     def _ended(self, text: str) -> None:
-        self._goal = None
+        self._goal = self._asking = None
         self.following.ended(time.monotonic())
         self._say(text)
 
@@ -188,12 +222,13 @@ class FollowNode(Node):
 
     def destroy_node(self) -> None:
         """Have the robot stop before the node goes."""
-        if self._asking is not None:  # who accepts later would follow with nobody to stop it
+        # Who accepts later would follow with nobody to stop it.
+        if self._unanswered or self._revoked is not None:
             self.following.asked = False
             executor = SingleThreadedExecutor(context=self.context)
             executor.add_node(self)
             end = time.monotonic() + ANSWER_S
-            while self._asking is not None and time.monotonic() < end:
+            while (self._unanswered or self._revoked is not None) and time.monotonic() < end:
                 executor.spin_once(timeout_sec=0.05)
             executor.shutdown(timeout_sec=0.0)
         if self._goal is not None:
