@@ -74,7 +74,8 @@ def _process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """What a main program changes in its process, put back."""
     monkeypatch.setenv(PROFILE_VARIABLE, '')
     monkeypatch.setattr(os, 'nice', lambda _: None)  # that of the tests stays
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in numbers}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

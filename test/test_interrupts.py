@@ -26,6 +26,7 @@ from rgbd_kcf_tracker.cli.common import progress
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.evaluation import jobs, report, runner, speed
+from rgbd_kcf_tracker.live.stopping import Stop
 from rgbd_kcf_tracker.recordings import open_recording
 
 SMALL = ['--size', '160x90', '--duration', '1']
@@ -171,6 +172,20 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
     with interrupts.handled():
         signal.raise_signal(signal.SIGINT)
         assert list(progress(range(3), 3, 'steps')) == [0, 1, 2]
+
+
+@pytest.mark.usefixtures('_process')
+def test_a_node_hears_that_its_terminal_closes_unless_it_is_to_live_on() -> None:
+    """Else ``follow`` would leave a robot driving."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    stop = Stop()
+    signal.raise_signal(signal.SIGHUP)
+    assert stop.is_set()
+    stop.ignore()
+    signal.raise_signal(signal.SIGHUP)
+    unhurt = Stop()  # as under nohup
+    signal.raise_signal(signal.SIGHUP)
+    assert not unhurt.is_set()
 
 
 @pytest.mark.parametrize('command', ['track', 'convert', 'simulate'])

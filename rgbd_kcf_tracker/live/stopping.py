@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""SIGINT and SIGTERM as something to ask for; to be set up before anything else is imported."""
+"""SIGINT, SIGTERM and SIGHUP as something to ask for; to be set up before other imports."""
 
 from __future__ import annotations
 
@@ -32,12 +32,17 @@ class Stopping(Protocol):
 class Stop:
     """Notes the signals that ask a process to end, from now on and however often they come.
 
+    SIGHUP comes when a terminal closes; under nohup it is ignored, and stays so.
+
     No :class:`threading.Event`: a signal that comes while its lock is held would wait for itself.
     """
 
     def __init__(self) -> None:
         self._asked = False
-        for number in (signal.SIGINT, signal.SIGTERM):
+        self._signals = [signal.SIGINT, signal.SIGTERM]
+        if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+            self._signals.append(signal.SIGHUP)
+        for number in self._signals:
             signal.signal(number, self._note)
 
     def is_set(self) -> bool:
@@ -56,7 +61,7 @@ class Stop:
 
         ``ros2 launch`` sends SIGINT too, beside the terminal's.
         """
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in self._signals:
             signal.signal(number, signal.SIG_IGN)
 
     def _note(self, *_: Any) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Ask for following and for stopping until SIGINT or SIGTERM."""
+    """Ask for following and for stopping until SIGINT, SIGTERM or SIGHUP."""
     stop = Stop()  # first of all: what follows takes a second
     from rgbd_kcf_tracker.ros.process import ends_at_once, node_parser, run, spin
 

@@ -204,8 +204,8 @@ class FollowNode(Node):
 
     def _cancel(self, reason: str) -> None:
         goal, self._goal = self._goal, None
-        self._say(f'the robot is to stop: {reason}')
         goal.cancel_goal_async()
+        self._say(f'the robot is to stop: {reason}')
         # The target may be seen again at once: then it is followed at once.
 
     def _ended(self, text: str) -> None:

@@ -19,7 +19,7 @@ waits for it: a tenth of Python's default (docs/live.md)."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the tracker node until SIGINT or SIGTERM."""
+    """Run the tracker node until SIGINT, SIGTERM or SIGHUP."""
     stop = Stop()  # first of all: what follows takes a second
     from rgbd_kcf_tracker.live.memory import keep_large_blocks, set_objects_aside
     from rgbd_kcf_tracker.ros.process import ends_at_once, node_parser, run, spin

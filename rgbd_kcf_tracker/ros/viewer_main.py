@@ -20,7 +20,7 @@ GIVE_WAY = 10
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Serve the page until SIGINT or SIGTERM."""
+    """Serve the page until SIGINT, SIGTERM or SIGHUP."""
     stop = Stop()  # first of all: what follows takes a second
     import contextlib
     import os
