@@ -291,6 +291,23 @@ def test_a_bug_in_a_tracker_leaves_no_pair_unanswered() -> None:
     assert faults == ['internal error: ZeroDivisionError: broken']
 
 
+@pytest.mark.parametrize('step', ['at', 'judged'])
+def test_a_bug_in_what_places_the_camera_leaves_no_pair_unanswered(step: str) -> None:
+    def broken(*_: Any) -> Places:
+        raise ZeroDivisionError('broken')
+
+    here = Places(Pose(np.eye(3), np.zeros(3)))
+    told = {'at': lambda _: here, 'judged': lambda places, _: places}
+    faults: list[str] = []
+    made = processor(faults, places=SimpleNamespace(**told | {step: broken}))
+    answers: list[Any] = []
+    made._publishers.publish = answers.append
+    image = image_message(HEADER, np.zeros((60, 80, 3), np.uint8), 'bgr8')
+    made(Capture(image, None, None, 0))
+    assert [answer.frame.pose for answer in answers] == [None]
+    assert faults == ['internal error: ZeroDivisionError: broken']
+
+
 @pytest.mark.parametrize(
     ('box', 'shown'),
     [

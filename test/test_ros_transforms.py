@@ -196,6 +196,26 @@ def test_stamps_that_tf_has_forgotten_pause(rig: Rig) -> None:
         assert 'older than what TF remembers' in values['last_error']
 
 
+@pytest.mark.parametrize(
+    ('start_ns', 'why'), [(0, 'images have no stamp'), (-5_000_000_000, 'of this stamp')]
+)
+def test_stamps_that_are_none_pause_and_are_answered(rig: Rig, start_ns: int, why: str) -> None:
+    """To TF, zero is the newest."""
+    base = Base(rig)
+    with running_node(rig, queue_policy='all', init_box=box_text(), target_frame='odom') as node:
+        base.listened()
+        base.mount()
+        base.stand(stamp_of(0))
+        settled(rig, node, 'odom', stamp_of(0))
+        rig.send(0, stamp_ns=start_ns)
+        rig.wait(lambda: bool(rig.boxes), what='an answer')
+        values = rig.fresh_values()
+        assert rig.box().iou(scene(0)[2]) > 0.6
+        assert rig.positions == []
+        assert int(values['tf_missing']) == 1
+        assert why in values['last_error']
+
+
 def test_tf_that_jumps_is_left_out_where_it_jumps(rig: Rig) -> None:
     base = Base(rig)
     with running_node(rig, queue_policy='all', init_box=box_text(), target_frame='odom') as node:

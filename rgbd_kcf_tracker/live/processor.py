@@ -166,21 +166,22 @@ class Processor:
             decoded = time.monotonic_ns()
             track = self._unseen()
             if frame is not None:
-                if self._places is not None:
-                    places = self._places.at(header)
-                    frame = replace(frame, pose=places.fixed)
                 try:
+                    if self._places is not None:
+                        places = self._places.at(header)
+                        frame = replace(frame, pose=places.fixed)
                     track = in_picture(session.process(frame), frame)
                     others = tuple(in_picture(other, frame) for other in session.others)
                     insights = session.insights
+                    if self._places is not None:
+                        places = self._places.judged(places, session.camera_motion)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
+                    places = Places()
                     self._fault(
                         'internal_errors', f'internal error: {type(error).__name__}: {error}'
                     )
-                if self._places is not None:
-                    places = self._places.judged(places, session.camera_motion)
-                    if places.fixed is None:
-                        frame = replace(frame, pose=None)
+                if self._places is not None and places.fixed is None:
+                    frame = replace(frame, pose=None)
         tracked = time.monotonic_ns()
         answer = Answer(
             header,

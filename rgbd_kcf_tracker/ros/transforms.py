@@ -152,7 +152,12 @@ class Transforms:
     def _looked_up(self, frame: str, header: Any, end: float) -> Pose:
         if not header.frame_id:
             raise Unplaced('tf_missing', 'images have no frame_id, so TF cannot place them')
-        stamp = Time.from_msg(header.stamp)
+        try:
+            stamp = Time.from_msg(header.stamp)
+        except (ValueError, OverflowError) as error:
+            raise Unplaced('tf_missing', f'TF cannot place images of this stamp: {error}') from None
+        if stamp.nanoseconds == 0:  # to TF that is the newest
+            raise Unplaced('tf_missing', 'images have no stamp, so TF cannot place them')
         while True:
             try:
                 return self._asked(frame, header.frame_id, stamp)
