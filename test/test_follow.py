@@ -65,6 +65,14 @@ def test_a_silent_tracker_stops_the_robot() -> None:
     assert one.reason_to_stop(1.1) == 'the tracker is silent'
 
 
+def test_who_gives_up_at_once_follows_while_the_target_is_in_sight() -> None:
+    one = following(give_up_after=0.0)
+    one.answer(0.0, seen=True, hidden=False)
+    assert one.to_begin(0.03)
+    one.answer(0.04, seen=False, hidden=True)
+    assert one.reason_to_stop(0.05) == 'the target is out of sight for 0 s'
+
+
 def test_after_an_end_it_waits_before_it_asks_again() -> None:
     one = following(retry_after=2.0)
     one.answer(0.0, seen=True, hidden=False)

@@ -106,6 +106,6 @@ class Following:
             return 'the tracker is silent'
         if self._seen is None:
             return 'there is no target'
-        if now_s - self._seen > self._parameters.give_up_after:
+        if not self._visible and now_s - self._seen > self._parameters.give_up_after:
             return f'the target is out of sight for {self._parameters.give_up_after:g} s'
         return ''
