@@ -30,6 +30,8 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, RegionOfInterest
 from stand_ins import tf2_ros
 
+from rgbd_kcf_tracker.errors import ParameterError
+from rgbd_kcf_tracker.live.settings import NodeParameters
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings.messages import stamp_of as stamp
 from rgbd_kcf_tracker.ros.messages import stamp_from_ns
@@ -306,6 +308,29 @@ def test_targets_are_frames(rig: Rig) -> None:
             node.trigger_configure()
             node.trigger_activate()
         rig.wait(lambda: rig.node.count_publishers('/tf') == publishers)
+
+
+@pytest.mark.parametrize('name', ['', 'base_link', 'odom'])
+def test_a_target_has_a_frame_of_its_own_name(name: str) -> None:
+    frames = {'target_frame': 'base_link', 'fixed_frame': 'odom', 'tf_name': name}
+    NodeParameters(**frames)
+    with pytest.raises(ParameterError, match=f"tf_name is '{name}': give"):
+        NodeParameters(**frames, publish_tf='all')
+
+
+def test_no_target_takes_the_frame_of_the_images(
+    rig: Rig, capfd: pytest.CaptureFixture[str]
+) -> None:
+    heard: list[TransformStamped] = []
+    rig.node.create_subscription(TF_MESSAGE, '/tf', lambda m: heard.extend(unpacked(m)), 100)
+    with running_node(
+        rig, queue_policy='all', init_box=box_text(), publish_tf='target', tf_name=FRAME_ID
+    ):
+        rig.wait(lambda: rig.node.count_publishers('/tf') > 0)
+        rig.play(range(5))
+        rig.wait(lambda: len(rig.positions) >= 5)
+    assert not heard
+    assert capfd.readouterr().err.count('is the frame of the images') == 1
 
 
 @pytest.mark.skipif(REAL, reason='tf2_ros is installed')

@@ -197,6 +197,11 @@ class NodeParameters(Parameters):
                 f'parameter auto_init_near is {near:g} and auto_init_far {far:g}: nobody is '
                 'between them: the first must be the smaller'
             )
+        if self.publish_tf != OFF and self.tf_name in ('', self.target_frame, self.fixed_frame):
+            raise ParameterError(
+                f"parameter tf_name is {self.tf_name!r}: give the target's frame a name of its "
+                'own, other than target_frame and fixed_frame'
+            )
 
 
 READ_ONLY = frozenset(

@@ -158,7 +158,8 @@ class TrackPublishers:
         if self._frames is not None:
             if not self._everyones_frames:
                 near = {who: w for who, w in near.items() if who == answer.track.id}
-            self._frames.send(make, header, near.values(), answer.track.id)
+            camera = answer.header.frame_id
+            self._frames.send(make, header, near.values(), answer.track.id, camera)
         if where is None:
             return
         if self.wanted('position'):

@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.recordings.whereabouts import Whereabouts
 
 ASK_AGAIN_S = 0.002
 """Between two looks at the buffer while a transform is waited for, which is mostly soon there."""
+WARN_AGAIN_S = 5.0
 CARRIED_SHIFT, CARRIED_TURN = 0.002, 0.005
 """Metres and radians within which a camera stands still in a frame that moves with it."""
 MOVED = 0.02
@@ -211,17 +212,28 @@ class TargetFrames:
         self._broadcaster = tf2('publish_tf').TransformBroadcaster(node)
 
     def send(
-        self, make: TrackMessages, header: Any, wheres: Iterable[Whereabouts], chosen: int
+        self,
+        make: TrackMessages,
+        header: Any,
+        wheres: Iterable[Whereabouts],
+        chosen: int,
+        camera: str,
     ) -> None:
-        """Send a frame for each target: its name for the chosen one, name_id for the others."""
-        sent = [
-            make.transform(
-                header,
-                self._name if where.track.id == chosen else f'{self._name}_{where.track.id}',
-                where,
+        """Send a frame for each target: its name for the chosen one, name_id for the others.
+
+        None that is called as the camera's own: it would tear that one out of its place.
+        """
+        sent = []
+        for where in wheres:
+            name = self._name if where.track.id == chosen else f'{self._name}_{where.track.id}'
+            if name != camera:
+                sent.append(make.transform(header, name, where))
+                continue
+            self._node.get_logger().warning(
+                f'no TF frame for the target: {name!r} is the frame of the images; give another '
+                'tf_name',
+                throttle_duration_sec=WARN_AGAIN_S,
             )
-            for where in wheres
-        ]
         if sent:
             self._broadcaster.sendTransform(sent)
 
