@@ -20,6 +20,17 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 import rclpy
 import replay_rig as rig
+from bag_rig import (
+    COLOR,
+    DEPTH,
+    INFO,
+    ROS2,
+    START_NS,
+    Sent,
+    camera_messages,
+    make_frames,
+    write_rosbag2,
+)
 from geometry_msgs.msg import PolygonStamped
 from rclpy.node import Node
 
@@ -326,6 +337,24 @@ def test_bad_bags(bag: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
         path = tmp_path / name
         path.write_bytes(content)
         assert words in refusal(tmp_path, capfd, bag=str(path), wait_for_subscribers=0.0)
+
+
+def test_from_the_middle_what_was_said_once_is_said_first(tmp_path: Path) -> None:
+    """A tracker would know neither its camera nor where that is."""
+    images = camera_messages(make_frames(6))
+    (_, *after), middle = [s for s in images if s.topic == INFO], images[9].log_ns
+    still = ROS2.types['tf2_msgs/msg/TFMessage']
+    sent = [
+        *(Sent('/tf_static', START_NS + at, still(transforms=[])) for at in (0, 1)),
+        *(s for s in images if s not in after),
+    ]
+    path = write_rosbag2(tmp_path / 'bag', sent)
+    with ReplaySource(path, ReplayParameters()) as source:
+        start = (middle - START_NS) * 1e-9
+        played = list(source.messages(start))
+        assert [m.topic for m in played[:5]] == ['/tf_static'] * 2 + [INFO, COLOR, DEPTH]
+        assert {m.time_ns for m in played[:4]} == {played[3].time_ns}
+        assert len(list(source.messages())) == len(sent)
 
 
 @pytest.mark.parametrize('compression', ['lz4', 'zstd'])

@@ -28,7 +28,11 @@ class ReplayParameters(Parameters):
     )
     loop: bool = parameter(False, 'Begin again at the end, with the recorded stamps.')
     start: float = parameter(
-        0.0, 'Where to begin, from the first message of the recording.', unit='s', minimum=0.0
+        0.0,
+        'Where to begin, from the first message of the recording; earlier /tf_static and the last '
+        'camera_info before it go ahead.',
+        unit='s',
+        minimum=0.0,
     )
     clock: bool = parameter(
         True, 'Publish the recorded time on /clock, for nodes with use_sim_time.'

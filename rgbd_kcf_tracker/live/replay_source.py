@@ -140,6 +140,9 @@ class ReplaySource(Closing):
     def messages(self, start_s: float = 0.0) -> Iterator[Message]:
         """All messages from ``start_s`` seconds after the first, in recorded order.
 
+        Ahead of them comes what holds on and may have been said only before: ``/tf_static``, and
+        the last CameraInfo of each camera.
+
         Raises:
             RecordingError: where the recording cannot be read on.
         """
@@ -226,21 +229,32 @@ class _BagMessages:
 
     def read(self, names: frozenset[str], start_s: float) -> Iterator[Message]:
         first: int | None = None
+        holding: dict[tuple[str, int], tuple[Topic, int]] = {}
         for topic, index in self._bag.in_order(names):
             time_ns = topic.log_ns[index]
             if first is None:
                 first = time_ns
             if (time_ns - first) * 1e-9 < start_s:
+                if topic.name.endswith('/tf_static'):  # each of its own frames
+                    holding[topic.name, index] = topic, index
+                elif self._kind(topic) == _INFO:
+                    holding[topic.name, 0] = topic, index
                 continue
-            data: Any = self._bag.read(topic, index)
-            if self._translate is not None:
-                try:
-                    data = bytes(self._translate.data(topic.type, data))
-                except RecordingError as error:
-                    raise RecordingError(
-                        f'{self._bag.path}: message {index} of {topic.name}: {error}'
-                    ) from None
-            yield Message(topic.name, time_ns, data, self._role(topic.name), topic.stamp_ns[index])
+            for before in holding.values():
+                yield self._message(*before, time_ns)
+            holding.clear()
+            yield self._message(topic, index, time_ns)
+
+    def _message(self, topic: Topic, index: int, time_ns: int) -> Message:
+        data: Any = self._bag.read(topic, index)
+        if self._translate is not None:
+            try:
+                data = bytes(self._translate.data(topic.type, data))
+            except RecordingError as error:
+                raise RecordingError(
+                    f'{self._bag.path}: message {index} of {topic.name}: {error}'
+                ) from None
+        return Message(topic.name, time_ns, data, self._role(topic.name), topic.stamp_ns[index])
 
     def _role(self, name: str) -> Role:
         if name == self.color_topic:
