@@ -75,6 +75,27 @@ def test_pacer_survives_time_jumping_back() -> None:
     assert pacer.due(0) == clock.time
 
 
+@pytest.mark.parametrize(('pairs', 'period_s'), [(1, 1 / 30), (2, 0.04)])
+def test_a_round_begins_a_frame_after_the_last_one(pairs: int, period_s: float) -> None:
+    clock = HandClock()
+    pacer = Pacer(2.0, now=clock)
+    player = Player(lambda _: None, pacer, Answers(True))
+    due: list[float] = []
+
+    def arrive(time_ns: int, *_: object) -> bool:
+        clock.time = pacer.due(time_ns)
+        due.append(clock.time)
+        return True
+
+    pacer.wait = arrive  # type: ignore[method-assign]
+    for _ in range(3):
+        assert player.play(recording(pairs, step_ms=40), threading.Event())
+    a_round = 3 * pairs
+    assert due[0] == 100.0
+    for begun in (a_round, 2 * a_round):
+        assert due[begun] - due[begun - 1] == pytest.approx(period_s / 2)
+
+
 def test_pacer_wait_ticks_and_stops() -> None:
     pacer = Pacer(1.0)
     stop = threading.Event()

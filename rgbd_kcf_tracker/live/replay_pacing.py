@@ -37,14 +37,18 @@ class Pacer:
         self._patience_s = patience_s
         self._now = now
         self._origin: tuple[float, int] | None = None
+        self._pause_ns = 0
         self.restarts = 0
 
     def due(self, time_ns: int) -> float:
         """Wall-clock time at which the message recorded at ``time_ns`` is due."""
         now = self._now()
-        if self._origin is None or self._rate == 0:
+        if self._rate == 0:
             self._origin = (now, time_ns)
             return now
+        if self._origin is None:
+            self._origin = (now + self._pause_ns * 1e-9 / self._rate, time_ns)
+            return self._origin[0]
         wall, recorded_ns = self._origin
         due = wall + (time_ns - recorded_ns) * 1e-9 / self._rate
         if now - due > self._patience_s:
@@ -60,9 +64,9 @@ class Pacer:
         wall, recorded_ns = self._origin
         return recorded_ns + int((self._now() - wall) * self._rate * 1e9)
 
-    def reset(self) -> None:
-        """Start anew at the next message."""
-        self._origin = None
+    def reset(self, pause_ns: int = 0) -> None:
+        """Start anew at the next message, after a pause in recorded time."""
+        self._origin, self._pause_ns = None, pause_ns
 
     def wait(self, time_ns: int, stop: Stopping, tick: Callable[[int], None] | None = None) -> bool:
         """Wait until the message recorded at ``time_ns`` is due; False when ``stop`` was set.

@@ -25,6 +25,12 @@ RECENT = 8
 """Images that are kept for sending again."""
 
 
+FRAME_NS = 33_333_333
+"""Between two rounds of a single image."""
+LONGEST_NS = 1_000_000_000
+"""Between two rounds, at most: the last images may be far from each other."""
+
+
 @dataclass(slots=True)
 class Progress:
     """What a player has done so far."""
@@ -73,12 +79,16 @@ class Player:
         self._warn = warn
         self._recent: deque[Message] = deque(maxlen=RECENT)
         self._last_stamp_ns: int | None = None
+        self._period_ns = FRAME_NS
         self._same_told = False
         self.progress = Progress()
 
     def play(self, messages: Iterable[Message], stop: Stopping) -> bool:
-        """Send all messages once; False when ``stop`` was set before the end."""
-        self._pacer.reset()
+        """Send all messages once; False when ``stop`` was set before the end.
+
+        Another round begins one period of the colour images after the last.
+        """
+        self._pacer.reset(self._period_ns if self.progress.rounds else 0)
         with prefetched(messages) as ahead:
             for message in ahead:
                 if not self._pacer.wait(message.time_ns, stop, self._tick):
@@ -98,6 +108,8 @@ class Player:
     def _announce(self, message: Message) -> None:
         if message.role is Role.COLOR:
             self.progress.colors += 1
+            if self._last_stamp_ns is not None and message.stamp_ns > self._last_stamp_ns:
+                self._period_ns = min(message.stamp_ns - self._last_stamp_ns, LONGEST_NS)
             if self._lockstep and message.stamp_ns == self._last_stamp_ns and not self._same_told:
                 self._same_told = True
                 self._warn(
