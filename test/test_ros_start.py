@@ -89,6 +89,14 @@ def test_what_cannot_be_understood_is_refused(
             'qos_overrides./color/image.subscription.reliability:=magic',
             'Unexpected QoS override',
         ),
+        (
+            'qos_overrides./color/image.subscription.depth:=ten',
+            "subscription.depth is 'ten': it must be a whole number, between 1 and 1000",
+        ),
+        (
+            'qos_overrides./depth/image.subscription.depth:=3000000000',
+            'subscription.depth is 3000000000: it must be between 1 and 1000',
+        ),
     ],
 )
 def test_a_tracker_refuses_wrong_parameters(
@@ -96,6 +104,23 @@ def test_a_tracker_refuses_wrong_parameters(
 ) -> None:
     assert tracker_main.main(['--ros-args', '-p', arguments]) == 2
     assert words in capfd.readouterr().err
+
+
+@pytest.mark.usefixtures('_process')
+@pytest.mark.parametrize(
+    ('said', 'told'), [('', 'ValueError'), ('no such thing\nbut these:\n1. a', 'no such thing')]
+)
+def test_why_it_cannot_start_is_one_line_and_not_none(
+    said: str, told: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rgbd_kcf_tracker.ros import tracker_node
+
+    def broken(*_: object, **__: object) -> None:
+        raise ValueError(said)
+
+    monkeypatch.setattr(tracker_node, 'Subscriptions', broken)
+    assert tracker_main.main(['--ros-args']) == 2
+    assert capfd.readouterr().err.splitlines()[-1] == f'tracker: cannot activate: {told}'
 
 
 @pytest.mark.usefixtures('_process')

@@ -202,6 +202,23 @@ def test_qos_can_be_overridden_by_ros_own_parameters(rig: Rig) -> None:
         assert 'bad_parameters' not in rig.fresh_values()
 
 
+@pytest.mark.parametrize(
+    ('rest', 'meant'),
+    [
+        ('/colour/image.subscription.reliability', '/color/image.subscription.reliability'),
+        ('/color/image.subscription.dept', '/color/image.subscription.depth'),
+        ('/clock.subscription.depth', None),
+    ],
+)
+def test_a_qos_override_that_nobody_reads_is_told(
+    rest: str, meant: str | None, rig: Rig, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with running_node(rig, **{f'qos_overrides.{rest}': 'reliable'}):
+        pass
+    told = f"unknown parameter 'qos_overrides.{rest}': did you mean 'qos_overrides.{meant}'?"
+    assert (told in capfd.readouterr().err) == (meant is not None)
+
+
 def test_recorded_time(rig: Rig) -> None:
     """With use_sim_time, ages are told in the clock of the recording, through its loop too."""
     clock = rig.node.create_publisher(Clock, '/clock', 10)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -59,7 +59,7 @@ def declare_all(
     for name, value in given.items():
         node.undeclare_parameter(name)
         if name not in infos:
-            problems.append(_unknown(name, infos))
+            problems.append(unknown(name, infos))
             continue
         try:
             values[name] = coerced(infos[name], value)
@@ -75,7 +75,8 @@ def declare_all(
         )
 
 
-def _unknown(name: str, infos: Iterable[str]) -> str:
+def unknown(name: str, infos: Collection[str]) -> str:
+    """That nobody reads this parameter, and what may have been meant."""
     near = difflib.get_close_matches(name, infos, n=1)
     known = f'did you mean {near[0]!r}?' if near else f'known are {", ".join(infos)}'
     return f'unknown parameter {name!r}: {known}'

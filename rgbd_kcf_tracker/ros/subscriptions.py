@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PointStamped
@@ -18,11 +19,15 @@ from std_msgs.msg import UInt32
 
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.live.settings import ALL, AUTO, RAW, RELIABLE, NodeParameters
+from rgbd_kcf_tracker.parameters import describe
+from rgbd_kcf_tracker.ros.parameters import coerced, unknown
 from rgbd_kcf_tracker.ros.unheard import unheard
 
 COLOR, DEPTH, CAMERA_INFO = 'color/image', 'depth/image', 'color/camera_info'
 REQUESTS = ('~/init', '~/init_point', '~/add', '~/remove')
 REQUEST_DEPTH = 10
+ROS_TOPICS = ('/clock.', '/parameter_events.', '/rosout.')
+"""Of rclpy's own, which may have overrides too."""
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 """They cost time with each message (see publishers), and diagnostics say what is silent."""
 
@@ -39,7 +44,8 @@ class Subscriptions:
         color, depth, camera_info, init, init_point, add, remove: called with each message.
 
     Raises:
-        ParameterError: where colour and depth would be one topic.
+        ParameterError: where colour and depth would be one topic, or a depth of ``qos_overrides``
+            cannot be.
     """
 
     def __init__(
@@ -56,7 +62,6 @@ class Subscriptions:
         remove: Callable[[Any], None],
     ) -> None:
         self._node, self._settings = node, settings
-        overriding = QoSOverridingOptions.with_default_policies()
         self._all: dict[str, Any] = {}
         transports = {COLOR: settings.color_transport, DEPTH: settings.depth_transport}
         names = {
@@ -68,6 +73,9 @@ class Subscriptions:
             raise ParameterError(
                 f'{COLOR} and {DEPTH} are both {one}: remap each to a topic of its own'
             )
+        overriding = QoSOverridingOptions.with_default_policies()
+        policies = [kind.name.lower() for kind in overriding.policy_kinds]
+        _check_overrides(node, (one, other, node.resolve_topic_name(CAMERA_INFO)), policies)
         for topic, callback in ((COLOR, color), (DEPTH, depth)):
             self._all[topic] = node.create_subscription(
                 Image if transports[topic] == RAW else CompressedImage,
@@ -128,6 +136,20 @@ class Subscriptions:
         for made in self._all.values():
             self._node.destroy_subscription(made)
         self._all.clear()
+
+
+def _check_overrides(node: Node, topics: Iterable[str], policies: Iterable[str]) -> None:
+    """Warn of overrides that nobody reads, and refuse a depth of which rclpy says little."""
+    prefix = 'qos_overrides'
+    known = [f'{prefix}.{topic}.subscription.{policy}' for topic in topics for policy in policies]
+    depth = next(info for info in describe(NodeParameters) if info.name == 'qos_depth')
+    for rest in node.get_parameters_by_prefix(prefix):
+        name = f'{prefix}.{rest}'
+        if name not in known:
+            if not rest.startswith(ROS_TOPICS):
+                node.get_logger().warning(unknown(name, known))
+        elif name.endswith('.depth'):
+            coerced(replace(depth, name=name), node.get_parameter(name).value)
 
 
 def image_qos(settings: NodeParameters) -> QoSProfile:

@@ -178,7 +178,7 @@ class TrackerNode(LifecycleNode):
             self._reset_service = self.create_service(Trigger, '~/reset', self._requests.reset)
             self._requests.from_parameters(frozenset({'init_box', 'auto_init'}))
         except Exception as error:  # rclpy would hide it
-            self._cannot(f'cannot configure: {error}')
+            self._cannot(f'cannot configure: {_first_line(error)}')
             self._take_down()
             return FAILURE
         return super().on_configure(state)
@@ -221,7 +221,7 @@ class TrackerNode(LifecycleNode):
                 remove=self._requests.remove,
             )
         except Exception as error:  # rclpy would hide it
-            self._cannot(f'cannot activate: {error}')
+            self._cannot(f'cannot activate: {_first_line(error)}')
             self._stop_listening()
             return FAILURE
         self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
@@ -428,3 +428,8 @@ class TrackerNode(LifecycleNode):
             depth_fault=self._intake.fit.fault if self._intake is not None else '',
             unheard=self._unheard_now(snapshot),
         )
+
+
+def _first_line(error: Exception) -> str:
+    """What an error says, on one line; rclpy's may say nothing, or list its own arguments."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]
