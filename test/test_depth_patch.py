@@ -204,3 +204,13 @@ def test_one_pixel_cannot_decide() -> None:
     depth = scene()
     depth[130:134, 130:134] = 0.3
     assert difference(memory(), depth).value < 0.05
+
+
+@pytest.mark.parametrize('near', range(1, 20))
+def test_a_target_has_a_distance_whatever_part_of_its_box_is_nearer(near: int) -> None:
+    """Between two surfaces there is no reading."""
+    depth = np.full((5, 4), WALL, np.float32)
+    depth.flat[:near] = OCCLUDER
+    patch = DepthPatch(trim_above=0.2, most_trim=0.25, walking_speed=2.0, cap=0.5)
+    patch.remember(depth)
+    assert patch.depth in (OCCLUDER, WALL)

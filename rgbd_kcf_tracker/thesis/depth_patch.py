@@ -127,7 +127,8 @@ class DepthPatch:
         depth = self._depth
         if depth is None or np.mean(np.abs(seen - depth) <= _BODY) < _OWN_SHARE:
             # The target is the nearer of what a box shows, even where it is the lesser part.
-            depth = float(np.quantile(seen, _NEARER_PART))
+            # A reading, for between two surfaces there is none.
+            depth = float(np.quantile(seen, _NEARER_PART, method='lower'))
         own = np.abs(patch - np.float32(depth)) <= _BODY
         before, self._depth = self._depth, float(np.median(patch[own]))
         self._learn_velocity(None if before is None else self._depth - before, interval)
