@@ -486,6 +486,21 @@ def test_a_run_is_not_repeated_and_others_are_added(pair: Path, tmp_path: Path, 
     assert first['MOTA %'] == second['MOTA %'] == '100'
 
 
+def test_a_truth_that_was_edited_and_is_as_before_is_the_one_measured_against(
+    pair: Path, tmp_path: Path, fake
+):
+    report, truth = tmp_path / 'report', (pair / 'mot.txt').read_text()
+    assert evaluate(pair, '--everyone', '--report', report) == 0
+    write(tmp_path / 'other' / 'lab.txt', (report / 'results/metric/everyone/lab.txt').read_text())
+    write(pair / 'mot.txt', truth.splitlines()[0])
+    words = ('--boxes', f'other={tmp_path / "other"}')
+    assert evaluate(pair, '--everyone', *words, '--report', report) == 0
+    write(pair / 'mot.txt', truth)
+    assert evaluate(pair, '--everyone', '--report', report) == 0
+    (row,) = table_of(report, 'everyone')
+    assert (row['people'], row['MOTA %']) == ('13', '100')
+
+
 def test_boxes_of_others_at_another_rate(pair: Path, tmp_path: Path):
     lines = (f'{f},1,{f},5,10,20,1,-1,-1,-1\n' for f in range(1, 9))
     write(tmp_path / 'other' / 'lab.txt', ''.join(lines))

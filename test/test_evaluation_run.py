@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.evaluation.jobs import (
     meta_path,
     thumbnails_path,
     tracks_path,
+    truth_key,
     truth_path,
 )
 from rgbd_kcf_tracker.evaluation.metrics import vot
@@ -180,8 +181,23 @@ def test_a_run_is_made_again_when_anything_that_decides_it_changes(tmp_path: Pat
 
 def test_pictures_of_another_rate_do_not_stay(tmp_path: Path):
     for count, kept in ((8, 8), (3, 3)):
-        runner.run([sequence('a', count)], [KCF], tmp_path, RunOptions())
-        assert len(read_thumbnails(thumbnails_path(tmp_path, 'a'))) == kept
+        one = sequence('a', count)
+        runner.run([one], [KCF], tmp_path, RunOptions())
+        path = thumbnails_path(tmp_path, 'a', truth_key(one, RunOptions()))
+        assert len(read_thumbnails(path)) == kept
+
+
+def test_runs_of_one_name_in_one_folder_are_each_held_against_their_own_truth(tmp_path: Path):
+    seen = {}
+    wide = Contender('wide', 'variant', 'kcf', (('padding', '2.0'),))
+    for tracker, count in ((KCF, 8), (wide, 6), (KCF, 8), (wide, 6)):
+        one, options = sequence('a', count), RunOptions()
+        if (tracker, count) in seen:
+            assert is_done(tmp_path, one, tracker, options)
+        runner.run([one], [tracker], tmp_path, options)
+        (found,) = collect(tmp_path, [one], [tracker], options).results
+        assert len(found.frames) == count
+        assert seen.setdefault((tracker, count), found.measures()) == found.measures()
 
 
 def test_a_run_that_was_cut_off_is_made_again(tmp_path: Path):
@@ -193,7 +209,8 @@ def test_a_run_that_was_cut_off_is_made_again(tmp_path: Path):
 def test_what_a_run_left_and_is_damaged_is_named_with_what_mends_it(tmp_path: Path):
     moving, options = sequence('moving'), RunOptions()
     runner.run([moving], [KCF], tmp_path, options)
-    truth, tracks = truth_path(tmp_path, 'moving'), tracks_path(tmp_path, 'kcf', 'moving')
+    truth = truth_path(tmp_path, 'moving', truth_key(moving, options))
+    tracks = tracks_path(tmp_path, 'kcf', 'moving')
     times = times_path(tmp_path, 'kcf', 'moving')
 
     def read() -> None:

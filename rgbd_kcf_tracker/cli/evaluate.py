@@ -247,11 +247,11 @@ def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
 
 def _report_everyone(folder: Path, whole: Whole) -> int:
     from rgbd_kcf_tracker.evaluation import everyone
-    from rgbd_kcf_tracker.evaluation.jobs import is_done
+    from rgbd_kcf_tracker.evaluation.jobs import is_done, truth_key
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_everyone_report
 
     results = [
-        everyone.read(folder, sequence, contender.name)
+        everyone.read(folder, sequence, contender.name, truth_key(sequence, whole.options))
         for sequence in whole.sequences
         for contender in whole.contenders
         if is_done(folder, sequence, contender, whole.options)

@@ -154,7 +154,7 @@ def run(args: argparse.Namespace) -> int:
         )
         words = f'{in_words(args)}; {args.search} search, seed {args.seed}'
         heading = Heading((*args.dataset, f'held out: {args.held_out}'), words)
-        frames = sweep_tables.frames(args.report, [*tried, *held])
+        frames = sweep_tables.frames(args.report, [*tried, *held], options)
         tables = write_sweep_report(args.report, found, failures, heading, frames)
         for table in tables[:2]:
             print(f'{table.text()}\n')

@@ -170,20 +170,26 @@ class Places:
     """Where the files of a run lie in a report's folder.
 
     Apart from those of single targets, of which one may have the same name.
+
+    Attributes:
+        folder: of the report.
+        sequence: its name.
+        key: of the truth, see :func:`rgbd_kcf_tracker.evaluation.jobs.truth_key`.
     """
 
     folder: Path
     sequence: str
+    key: str
 
     @property
     def truth(self) -> Path:
         """Who was where."""
-        return self.folder / 'truth' / 'everyone' / f'{slug(self.sequence)}.txt'
+        return self.folder / 'truth' / 'everyone' / f'{slug(self.sequence)}.{self.key}.txt'
 
     @property
     def bodies(self) -> Path:
         """The same with boxes of the whole bodies; not there where none is known."""
-        return self.truth.with_name(f'{slug(self.sequence)}.body.txt')
+        return self.truth.with_name(f'{slug(self.sequence)}.{self.key}.body.txt')
 
     def tracks(self, tracker: str) -> Path:
         """What a tracker said."""
@@ -201,6 +207,7 @@ def run(
     folder: Path,
     samples: Iterator[Sample],
     keys: Mapping[str, str],
+    truth_key: str,
     length: int | None = None,
 ) -> list[tuple[str, str]]:
     """Let each contender follow everyone, and write what came out.
@@ -211,6 +218,7 @@ def run(
         folder: of the report.
         samples: of the sequence.
         keys: of each contender's run, by its name.
+        truth_key: see :class:`Places`.
         length: frames of the recording, those that are not run included; None where unknown.
 
     Returns:
@@ -221,7 +229,7 @@ def run(
     passes.run(samples, truth, *runs.values())
     if not truth.numbers:
         raise RgbdKcfError(f'{sequence.name} has no frames')
-    places = Places(folder, sequence.name)
+    places = Places(folder, sequence.name, truth_key)
     rows, bodies = truth.sightings(), truth.bodies()
     write_atomically(places.truth, mot_text(rows))
     if bodies is not None:
@@ -257,21 +265,21 @@ def run(
     return failed
 
 
-def is_done(folder: Path, sequence: Sequence, tracker: str, key: str) -> bool:
+def is_done(folder: Path, sequence: Sequence, tracker: str, key: str, truth_key: str) -> bool:
     """Whether the same run has been made."""
-    places = Places(folder, sequence.name)
+    places = Places(folder, sequence.name, truth_key)
     if not (places.truth.is_file() and places.tracks(tracker).is_file()):
         return False
     return was_made_as(places.meta(tracker), key)
 
 
-def read(folder: Path, sequence: Sequence, tracker: str) -> EveryoneResult:
+def read(folder: Path, sequence: Sequence, tracker: str, truth_key: str) -> EveryoneResult:
     """The scores of a run that was made, from its files.
 
     Raises:
         RgbdKcfError: where a file is not as it was written.
     """
-    places = Places(folder, sequence.name)
+    places = Places(folder, sequence.name, truth_key)
     bodies = None
     with left_by_a_run():
         meta = read_json(places.meta(tracker))

@@ -99,9 +99,9 @@ class Job:
     folder: Path = Path()
 
 
-def truth_path(folder: Path, sequence: str) -> Path:
-    """Where the truth of a sequence lies."""
-    return folder / 'truth' / f'{slug(sequence)}.csv'
+def truth_path(folder: Path, sequence: str, key: str) -> Path:
+    """Where the truth of a sequence lies; see :func:`truth_key`."""
+    return folder / 'truth' / f'{slug(sequence)}.{key}.csv'
 
 
 def tracks_path(folder: Path, tracker: str, sequence: str) -> Path:
@@ -114,9 +114,18 @@ def meta_path(tracks: Path) -> Path:
     return tracks.with_suffix('.json')
 
 
-def thumbnails_path(folder: Path, sequence: str) -> Path:
-    """Where the small pictures of a sequence lie, all in one file."""
-    return folder / 'thumbs' / f'{slug(sequence)}.zip'
+def thumbnails_path(folder: Path, sequence: str, key: str) -> Path:
+    """Where the small pictures of a sequence lie, all in one file; see :func:`truth_key`."""
+    return folder / 'thumbs' / f'{slug(sequence)}.{key}.zip'
+
+
+def truth_key(sequence: Sequence, options: RunOptions) -> str:
+    """What decides a sequence's truth and pictures, as a short text that their names end in.
+
+    So runs of one sequence at several sizes or rates do not take each other's.
+    """
+    parts = [*_source(sequence), options.code, options.rate_hz]
+    return _digest(parts)[:12]
 
 
 def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> str:
@@ -125,12 +134,19 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
     if contender.kind == 'boxes':
         extra = dict(contender.files).get(sequence.name) or boxes_digest(sequence, contender)
     parts = [
-        sequence.identity, sequence.digest or files_digest(sequence.content),
-        contender.identity, extra, options.code,
+        *_source(sequence), contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,
         repr(options.intrinsics),
     ]  # fmt: skip
-    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:24]
+    return _digest(parts)[:24]
+
+
+def _source(sequence: Sequence) -> tuple[str, str]:
+    return sequence.identity, sequence.digest or files_digest(sequence.content)
+
+
+def _digest(parts: Items[object]) -> str:
+    return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
 def boxes_digest(sequence: Sequence, contender: Contender) -> str:
@@ -143,14 +159,13 @@ def boxes_digest(sequence: Sequence, contender: Contender) -> str:
 
 def is_done(folder: Path, sequence: Sequence, contender: Contender, options: RunOptions) -> bool:
     """Whether the same run has been made: same frames, parameters, code and options."""
+    key, truth = run_key(sequence, contender, options), truth_key(sequence, options)
     if sequence.kind == EVERYONE:
-        return everyone.is_done(
-            folder, sequence, contender.name, run_key(sequence, contender, options)
-        )
+        return everyone.is_done(folder, sequence, contender.name, key, truth)
     tracks = tracks_path(folder, contender.name, sequence.name)
-    if not (tracks.is_file() and truth_path(folder, sequence.name).is_file()):
+    if not (tracks.is_file() and truth_path(folder, sequence.name, truth).is_file()):
         return False
-    return was_made_as(meta_path(tracks), run_key(sequence, contender, options))
+    return was_made_as(meta_path(tracks), key)
 
 
 def run_job(job: Job) -> Packed[list[Failure]]:
@@ -191,11 +206,12 @@ def _run_sequence(job: Job) -> list[Failure]:
     stamps = truth.stamps_ns
     if not stamps:
         raise RgbdKcfError(f'{sequence.name}: the target is never clearly in view')
+    key = truth_key(sequence, options)
     write_truth(
-        truth_path(job.folder, sequence.name), stamps, truth.visible,
+        truth_path(job.folder, sequence.name, key), stamps, truth.visible,
         truth.bodies if opened.has_body else None, truth.fractions, truth.judged,
     )  # fmt: skip
-    write_atomically(thumbnails_path(job.folder, sequence.name), thumbnails.archive())
+    write_atomically(thumbnails_path(job.folder, sequence.name, key), thumbnails.archive())
 
     failures = []
     for contender in job.contenders:
@@ -221,7 +237,8 @@ def _run_everyone(job: Job, opened: Opened) -> list[Failure]:
     sequence, options = job.sequence, job.options
     samples = as_asked(opened.samples, sequence, options)
     keys = {c.name: run_key(sequence, c, options) for c in job.contenders}
-    failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, opened.length)
+    truth = truth_key(sequence, options)
+    failed = everyone.run(sequence, job.contenders, job.folder, samples, keys, truth, opened.length)
     return [Failure(sequence.name, tracker, reason) for tracker, reason in failed]
 
 

@@ -14,7 +14,7 @@ import jinja2
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.evaluation import plots, strips
-from rgbd_kcf_tracker.evaluation.jobs import tracks_path, truth_path
+from rgbd_kcf_tracker.evaluation.jobs import thumbnails_path, tracks_path, truth_path
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.store import read_tracks, read_truth
 
@@ -60,11 +60,11 @@ def strip_figures(
         own = measured.result(main, sequence)
         if own is None:
             continue
+        info = measured.infos[sequence]
         data = strips.strip(
-            folder,
-            sequence,
-            measured.infos[sequence].thumbnail_scale,
-            read_truth(truth_path(folder, sequence)).visible,
+            thumbnails_path(folder, sequence, info.truth_key),
+            info.thumbnail_scale,
+            read_truth(truth_path(folder, sequence, info.truth_key)).visible,
             boxes,
             palette,
             main,

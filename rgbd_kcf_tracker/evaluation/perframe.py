@@ -23,7 +23,14 @@ from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
-from rgbd_kcf_tracker.evaluation.jobs import RunOptions, is_done, meta_path, tracks_path, truth_path
+from rgbd_kcf_tracker.evaluation.jobs import (
+    RunOptions,
+    is_done,
+    meta_path,
+    tracks_path,
+    truth_key,
+    truth_path,
+)
 from rgbd_kcf_tracker.evaluation.metrics import Comparison, Measures, compare, measure
 from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place
 from rgbd_kcf_tracker.evaluation.metrics.vot import ShortTermRun
@@ -88,6 +95,7 @@ class Info:
         image_size: width and height.
         thumbnail_scale: of the pictures kept.
         simulated: whether whole bodies are known, as they are of simulated scenes alone.
+        truth_key: of the files of its truth and pictures.
     """
 
     name: str
@@ -98,6 +106,7 @@ class Info:
     image_size: tuple[int, int] = (0, 0)
     thumbnail_scale: float = 1.0
     simulated: bool = False
+    truth_key: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,23 +135,23 @@ def collect(
     collected = Collected([], {}, {}, [])
     for sequence in sequences:
         for contender in contenders:
-            path = tracks_path(folder, contender.name, sequence.name)
-            if not is_done(folder, sequence, contender, options):
-                continue
-            _collect_one(collected, folder, sequence, contender, path)
+            if is_done(folder, sequence, contender, options):
+                key = truth_key(sequence, options)
+                _collect_one(collected, folder, sequence, contender, key)
     return collected
 
 
 def _collect_one(
-    collected: Collected, folder: Path, sequence: Sequence, contender: Contender, path: Path
+    collected: Collected, folder: Path, sequence: Sequence, contender: Contender, key: str
 ) -> None:
+    path = tracks_path(folder, contender.name, sequence.name)
     with left_by_a_run():
         meta = read_json(meta_path(path))
         if not meta['annotated']:
             if sequence.name not in collected.unmeasured:
                 collected.unmeasured.append(sequence.name)
             return
-        place = truth_path(folder, sequence.name)
+        place = truth_path(folder, sequence.name, key)
         truth, tracks = read_truth(place), read_tracks(path)
         if len(truth.visible) != len(tracks.boxes):
             cut = place if len(truth.visible) < len(tracks.boxes) else path
@@ -161,6 +170,7 @@ def _collect_one(
         size,
         float(meta['thumbnail_scale']),
         truth.body is not None,
+        key,
     )
     frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
     collected.results.append(

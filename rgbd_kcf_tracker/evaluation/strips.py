@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import RgbdKcfError
-from rgbd_kcf_tracker.evaluation.jobs import thumbnails_path
 from rgbd_kcf_tracker.evaluation.passes import read_thumbnails
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.images import decode_color_bytes
@@ -32,8 +31,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 def strip(
-    folder: Path,
-    sequence: str,
+    pictures_path: Path,
     scale: float,
     truth: FloatArray,
     boxes: Mapping[str, FloatArray],
@@ -44,16 +42,15 @@ def strip(
     """A strip as JPEG; None where no picture was kept.
 
     Args:
-        folder: of the run.
-        sequence: its name.
-        scale: of the pictures that were kept.
+        pictures_path: file of the pictures that were kept.
+        scale: of these.
         truth: ``(N, 4)`` visible part, drawn dashed in black and white.
         boxes: per tracker ``(N, 4)``, drawn in the tracker's colour.
         palette: colours as ``#rrggbb``.
         main: the tracker drawn on top of the others.
         interesting: ``(N,)`` frames that should be among those shown (occlusion, errors).
     """
-    pictures = read_thumbnails(thumbnails_path(folder, sequence))
+    pictures = read_thumbnails(pictures_path)
     indices = np.array([i for i in pictures if i < len(truth)], np.int64)
     if not len(indices):
         return None

@@ -17,7 +17,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
-from rgbd_kcf_tracker.evaluation.jobs import RunOptions, truth_path
+from rgbd_kcf_tracker.evaluation.jobs import RunOptions, truth_key, truth_path
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import sensitivity
 from rgbd_kcf_tracker.evaluation.perframe import collect
@@ -97,11 +97,11 @@ def scores(
     return table[:, kept]
 
 
-def frames(folder: Path, sequences: Items[Sequence]) -> dict[str, int]:
+def frames(folder: Path, sequences: Items[Sequence], options: RunOptions) -> dict[str, int]:
     """Frames of each sequence that was run."""
     counts = {}
     for sequence in sequences:
-        path = truth_path(folder, sequence.name)
+        path = truth_path(folder, sequence.name, truth_key(sequence, options))
         if path.is_file():
             counts[sequence.name] = len(read_truth(path).stamps_ns)
     return counts
