@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.evaluation.everyone import follow
 from rgbd_kcf_tracker.evaluation.metrics.everyone import ALPHAS, mean, overlaps, score
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.mot import Sightings
+from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS
 from rgbd_kcf_tracker.track import Track, TrackState
 
 A, B, C = (0, 0, 10, 10), (100, 0, 10, 10), (200, 0, 10, 10)
@@ -308,6 +309,7 @@ def opened(path: Path, **options):
 def test_a_recording_with_mot_text(pair: Path):
     sequence, samples = opened(pair)
     assert (sequence.name, sequence.kind, len(samples)) == ('lab', 'everyone', 8)
+    assert {pair / INTRINSICS, pair / CAMERA_INFO} <= set(sequence.content), 'they are read'
     assert [p.id for p in samples[0].people] == [1, 7]
     assert samples[1].people[1].box == Box(32, 5, 10, 20)
     assert [p.counts for p in samples[2].people] == [True, False]

@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, with_trut
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, image_files
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, read_mot
-from rgbd_kcf_tracker.recordings.textfiles import read_boxes
+from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, read_boxes
 
 IMAGE_FOLDERS = ('rgb', 'color', 'img1', 'img')
 _CHALLENGE = Path('gt') / 'gt.txt'
@@ -54,7 +54,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
     """The one recording of a folder."""
     files = [*_truth_files(path), *sorted(path.glob('visible_*.txt'))]
     files += sorted(path.glob('body_*.txt'))
-    parts = [path / n for n in (*IMAGE_FOLDERS, 'depth', 'timestamps.txt', 'intrinsics.json')]
+    names = (*IMAGE_FOLDERS, 'depth', 'timestamps.txt', INTRINSICS, CAMERA_INFO, _INFO)
     return [
         Sequence(
             name=path.name,
@@ -62,7 +62,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
             kind=EVERYONE,
             open=partial(load, path, fps),
             identity=f'everyone:{fps}',
-            content=(*files, *parts, path / _INFO),
+            content=(*files, *(path / name for name in names)),
             path=path,
         )
     ]
