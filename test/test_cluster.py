@@ -27,12 +27,15 @@ import rgbd_kcf_tracker.batch.cluster
 from rgbd_kcf_tracker.batch.cluster import Cluster
 from rgbd_kcf_tracker.batch.environment import environment
 from rgbd_kcf_tracker.batch.loop import run_all
+from rgbd_kcf_tracker.batch.shards import Shard
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import DatasetError, WorkersError
 from rgbd_kcf_tracker.evaluation import runner
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets import Opened, Sequence, open_dataset
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+from rgbd_kcf_tracker.evaluation.parts import Whole, join, write_part
+from rgbd_kcf_tracker.evaluation.report import Heading
 
 distributed = pytest.importorskip(
     'distributed', reason="needs Dask: pip install 'rgbd_kcf_tracker[cluster]'"
@@ -150,6 +153,19 @@ def test_boxes_in_files_are_joined_without_the_files(serial: Path, tmp_path: Pat
     shutil.rmtree(tmp_path / 'peer')
     assert main(['evaluate', '--merge', str(tmp_path / 'r'), '--report', str(tmp_path / 'r')]) == 0
     assert_same(tmp_path / 'one', tmp_path / 'r')
+
+
+def test_people_of_one_recording_are_known_as_such_where_parts_are_joined(tmp_path: Path):
+    for part, place in ((1, '/here'), (2, '/there')):  # the same data on two machines
+        sequences = [
+            Sequence(name, 's', 'folder', broken, name, path=Path(place, name[0]))
+            for name in ('a/ann', 'a/bob', 'b')
+        ]
+        shard = Shard(part, 2)
+        own = Whole(shard.of(sequences), [], RunOptions(code='x'), Heading(('data',)), [])
+        write_part(tmp_path / str(part), shard, sequences, own)
+    whole = join([tmp_path / '1', tmp_path / '2'], tmp_path / 'r')
+    assert [s.recording for s in whole.sequences] == ['a/ann', 'a/ann', 'b']
 
 
 def test_any_executor_gives_the_same_bytes(tmp_path: Path):

@@ -233,9 +233,15 @@ def test_scores_on_real_and_simulated_data_apart():
 
 
 def test_interval_of_the_mean():
-    low, high = score_tables.bootstrap_interval(np.array([0.4, 0.5, 0.6, 0.5] * 20))
+    values = np.array([0.4, 0.5, 0.6, 0.5] * 20)
+    low, high = score_tables.bootstrap_interval(values, np.arange(80))
     assert 0.47 < low < 0.5 < high < 0.53
-    assert math.isnan(score_tables.bootstrap_interval(np.array([0.4]))[0])
+    assert math.isnan(score_tables.bootstrap_interval(np.array([0.4]), np.arange(1))[0])
+    # Twenty people in each of four recordings are four draws, not eighty.
+    together = score_tables.bootstrap_interval(values, np.arange(80) % 4)
+    assert together == pytest.approx(score_tables.bootstrap_interval(values[:4], np.arange(4)))
+    one = np.zeros(80, np.int64)
+    assert all(math.isnan(v) for v in score_tables.bootstrap_interval(values, one))
 
 
 def test_tables_as_csv_text_and_markdown():

@@ -137,8 +137,8 @@ def test_a_parameter_that_matters_is_told_from_one_that_does_not(balanced: bool)
     rng = np.random.default_rng(1)
     first, second = np.divmod(np.arange(25), 5)
     scores = noisy(rng, 25, 20) + 0.03 * first[:, None]
-    strong = sensitivity.effect(scores, first, balanced)
-    weak = sensitivity.effect(scores, second, balanced)
+    strong = sensitivity.effect(scores, first, balanced, np.arange(20))
+    weak = sensitivity.effect(scores, second, balanced, np.arange(20))
     assert strong.p < 0.01
     assert weak.p > 0.05
     assert strong.share > 0.9 > 0.1 > weak.share
@@ -154,7 +154,7 @@ def test_noise_is_taken_for_more_about_as_often_as_the_level_says(balanced: bool
     labels = np.arange(12) % 3
     ps = [
         sensitivity.effect(noisy(rng, 12, 8), labels if balanced else rng.permutation(labels),
-                           balanced).p
+                           balanced, np.arange(8)).p
         for _ in range(120)
     ]  # fmt: skip
     assert 0.01 <= np.mean(np.array(ps) < 0.05) <= 0.10
@@ -163,21 +163,41 @@ def test_noise_is_taken_for_more_about_as_often_as_the_level_says(balanced: bool
 
 def test_a_parameter_that_does_nothing_has_p_1():
     scores = np.tile(np.linspace(0.2, 0.9, 7), (6, 1))
-    one = sensitivity.effect(scores, np.arange(6) % 3, True)
+    one = sensitivity.effect(scores, np.arange(6) % 3, True, np.arange(7))
     assert (one.p, one.share, one.span) == (1.0, 0.0, 0.0)
 
 
 def test_gains_on_few_and_on_many_sequences():
     rng = np.random.default_rng(3)
-    many = sensitivity.gain(0.02 + 0.01 * rng.normal(size=30))
+    many = sensitivity.gain(0.02 + 0.01 * rng.normal(size=30), np.arange(30))
     assert many is not None
     assert 0 < many.low < many.mean < many.high
     assert many.p < 0.01
-    one = sensitivity.gain(np.array([0.5]))
+    one = sensitivity.gain(np.array([0.5]), np.arange(1))
     assert one is not None
     assert one.p == 1.0, 'one sequence tells nothing'
-    assert sensitivity.gain(np.zeros(5)) == sensitivity.Gain(0.0, 0.0, 0.0, 1.0)
-    assert sensitivity.gain(np.array([0.1, math.nan, 0.2])) is None
+    assert math.isnan(one.low), 'nor has it an interval'
+    assert sensitivity.gain(np.zeros(5), np.arange(5)) == sensitivity.Gain(0.0, 0.0, 0.0, 1.0)
+    assert sensitivity.gain(np.array([0.1, math.nan, 0.2]), np.arange(3)) is None
+
+
+def test_people_of_one_recording_are_one_draw(monkeypatch):
+    """Noise of three recordings is no gain and no effect, however many people are in each."""
+    monkeypatch.setattr(sensitivity, 'ROUNDS', 200)
+    rng = np.random.default_rng(4)
+    recordings = sensitivity.numbered(['a'] * 6 + ['b'] * 6 + ['c'] * 6)
+    assert recordings.tolist() == [0] * 6 + [1] * 6 + [2] * 6
+    for _ in range(40):
+        one = np.repeat(rng.normal(size=(9, 3)), 6, axis=1) + 0.3 * rng.normal(size=(9, 18))
+        found = sensitivity.gain(one[0], recordings)
+        assert found is not None
+        assert found.p > 0.05, 'the smallest of three signs is a quarter'
+    ps = [
+        sensitivity.effect(np.repeat(rng.normal(size=(9, 3)), 6, axis=1), np.arange(9) % 3, True,
+                           recordings).p
+        for _ in range(60)
+    ]  # fmt: skip
+    assert np.mean(np.array(ps) < 0.05) <= 0.15
 
 
 def test_whole_numbers_are_drawn_alike_the_ends_too():

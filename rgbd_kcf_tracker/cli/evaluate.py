@@ -162,7 +162,7 @@ def run(args: argparse.Namespace) -> int:
         )
         if shard is None:
             return _report(args.report, whole)
-        write_part(args.report, shard, [s.name for s in sequences], whole)
+        write_part(args.report, shard, sequences, whole)
     print(f'part {shard}: {len(own)} of {len(sequences)} sequences; join all parts with --merge')
     return end(failures)
 

@@ -10,8 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
-from rgbd_kcf_tracker.evaluation.metrics import Measures, confusion, mean
+from rgbd_kcf_tracker.evaluation.metrics import Measures, confusion, mean, sensitivity
 from rgbd_kcf_tracker.evaluation.metrics.confusion import Counts
+from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Labels
 from rgbd_kcf_tracker.evaluation.perframe import Info, Result
 
 
@@ -52,6 +53,11 @@ class Measured:
         """One measure of each sequence."""
         found = [getattr(m, name) for (t, _), m in self._measures.items() if t == tracker]
         return np.array(found, np.float64)
+
+    def recordings(self, tracker: str) -> Labels:
+        """Which recording each sequence is of, see :func:`sensitivity.numbered`."""
+        own = [s for t, s in self._measures if t == tracker]
+        return sensitivity.numbered([self.infos[s].recording or s for s in own])
 
     def counts(self, tracker: str, keep: Callable[[Info], bool] = lambda _: True) -> list[Counts]:
         """Counts of each sequence that is kept."""

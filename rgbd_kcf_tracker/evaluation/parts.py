@@ -53,29 +53,31 @@ class Whole:
     everyone: bool = False
 
 
-def write_part(folder: Path, shard: Shard, names: Items[str], part: Whole) -> Path:
+def write_part(folder: Path, shard: Shard, sequences: Items[Sequence], part: Whole) -> Path:
     """Say what the results in ``folder`` are a part of.
 
     Args:
         folder: of the results.
         shard: which part it is.
-        names: of all sequences, those of the other parts included.
+        sequences: all of them, those of the other parts included.
         part: this part.
     """
     path = folder / FOLDER / f'{shard.index}_of_{shard.count}.json'
-    known = {name: place for place, name in enumerate(names)}
+    known = {s.name: place for place, s in enumerate(sequences)}
+    # Where a recording lies is of a machine: it is named by the first sequence that is of it.
+    first = {s.recording: s.name for s in reversed(sequences)}
     content = {
         'part': shard.index,
         'parts': shard.count,
         'whole': {
-            'sequences': list(names),
+            'sequences': list(known),
             'contenders': [_contender(c) for c in part.contenders],
             'options': _options(part.options),
             'heading': asdict(part.heading),
             'exports': part.exports,
             'everyone': part.everyone,
         },
-        'sequences': [_sequence(s) for s in part.sequences],
+        'sequences': [_sequence(s) | {'recording': first[s.recording]} for s in part.sequences],
         'places': [known[s.name] for s in part.sequences],
         'files': {c.name: dict(c.files) for c in part.contenders if c.files},
         'failures': [asdict(f) for f in part.failures],

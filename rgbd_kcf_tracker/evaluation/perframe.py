@@ -96,6 +96,7 @@ class Info:
         thumbnail_scale: of the pictures kept.
         simulated: whether whole bodies are known, as they are of simulated scenes alone.
         truth_key: of the files of its truth and pictures.
+        recording: which one it is of; empty for one of its own.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Info:
     thumbnail_scale: float = 1.0
     simulated: bool = False
     truth_key: str = ''
+    recording: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +173,7 @@ def _collect_one(
         float(meta['thumbnail_scale']),
         truth.body is not None,
         key,
+        sequence.recording,
     )
     frames = compare(tracks.boxes, truth.visible, truth.body, tracks.scores, skip=0)
     collected.results.append(

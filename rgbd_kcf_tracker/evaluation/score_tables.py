@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import (
     calibration,
@@ -77,7 +78,9 @@ def overview(measured: Measured) -> Table:
     rows = []
     for tracker in measured.trackers:
         m = measured.mean(tracker)
-        low, high = bootstrap_interval(measured.values(tracker, 'success'))
+        low, high = bootstrap_interval(
+            measured.values(tracker, 'success'), measured.recordings(tracker)
+        )
         rows.append(
             (
                 tracker,
@@ -92,7 +95,8 @@ def overview(measured: Measured) -> Table:
         f'All measures, mean over {number(measured)}',
         ('tracker', headings[0], '95 % interval', *headings[1:]),
         tuple(rows),
-        note='The interval is of the mean over sequences (bootstrap).',
+        note='The interval is of the mean over sequences, those of one recording together '
+        '(bootstrap).',
     )
 
 
@@ -300,12 +304,15 @@ def data_of(measured: Measured, sequence: str) -> str:
     return SIMULATED if measured.infos[sequence].simulated else REAL
 
 
-def bootstrap_interval(values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[float, float]:
-    """95 % interval of the mean of independent sequences; NaN below two of them."""
-    known = values[~np.isnan(values)]
-    if len(known) < 2:
-        return math.nan, math.nan
-    low, high = sensitivity.bootstrap(known[None])
+def bootstrap_interval(values: FloatArray, recordings: sensitivity.Labels) -> tuple[float, float]:
+    """95 % interval of the mean over sequences; NaN below two recordings.
+
+    Args:
+        values: ``(Q,)``, NaN where a sequence has none.
+        recordings: ``(Q,)`` which one each is of.
+    """
+    known = ~np.isnan(values)
+    low, high = sensitivity.bootstrap(values[known][None], recordings[known])
     return float(low[0]), float(high[0])
 
 

@@ -229,8 +229,7 @@ def split(
         raise ParameterError(f'--held-out {share:g}: give a share between 0 and 1, or a data set')
     recordings: dict[str, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
     for sequence in sequences:
-        own = sequence.name if sequence.path is None else str(sequence.path)
-        recordings[sequence.scenario][own].append(sequence.name)
+        recordings[sequence.scenario][sequence.recording].append(sequence.name)
     rng = np.random.default_rng(seed)
     ranked: list[tuple[float, str, list[str]]] = []
     for scenario in recordings.values():

@@ -20,6 +20,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
 from rgbd_kcf_tracker.evaluation.jobs import RunOptions, truth_key, truth_path
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import sensitivity
+from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Labels
 from rgbd_kcf_tracker.evaluation.perframe import collect
 from rgbd_kcf_tracker.evaluation.store import read_truth
 from rgbd_kcf_tracker.evaluation.sweep import Axis, Setting
@@ -45,8 +46,10 @@ class Found:
         default: the setting that all others are held against.
         settings: the others.
         tried: ``(1 + S, Q)`` scores of the default and of the settings; NaN where one failed.
+        tried_of: ``(Q,)`` which recording each sequence is of.
         finalists: indices of the best settings, which ran on held-out sequences too.
         held_out: ``(1 + F, H)`` scores of the default and the finalists there.
+        held_out_of: ``(H,)`` which recording each sequence is of.
     """
 
     measure: str
@@ -55,8 +58,10 @@ class Found:
     default: Setting
     settings: tuple[Setting, ...]
     tried: FloatArray
+    tried_of: Labels
     finalists: tuple[int, ...]
     held_out: FloatArray
+    held_out_of: Labels
 
     @property
     def sign(self) -> float:
@@ -75,8 +80,11 @@ def scores(
     settings: Items[Setting],
     options: RunOptions,
     measure: str,
-) -> FloatArray:
-    """``(S, Q)`` scores of settings on sequences from what their runs left; NaN where one failed.
+) -> tuple[FloatArray, Labels]:
+    """What settings scored on sequences, from what their runs left.
+
+    Returns:
+        ``(S, Q)`` scores, NaN where one failed, and ``(Q,)`` which recording each sequence is of.
 
     Raises:
         DatasetError: where no sequence has the measure.
@@ -94,7 +102,7 @@ def scores(
             f'no sequence has {measure} of {settings[0].contender.name}: choose another --measure, '
             'or see failures.txt'
         )
-    return table[:, kept]
+    return table[:, kept], sensitivity.numbered([s.recording for s in sequences])[kept]
 
 
 def frames(folder: Path, sequences: Items[Sequence], options: RunOptions) -> dict[str, int]:
@@ -130,7 +138,10 @@ def all_tables(found: Found) -> list[Table]:
 
 def held_out(found: Found) -> Table:
     """The default and the finalists on sequences that took no part in choosing."""
-    gains = [sensitivity.gain(found.held_out[i] - found.held_out[0]) for i in _places(found)]
+    gains = [
+        sensitivity.gain(found.held_out[i] - found.held_out[0], found.held_out_of)
+        for i in _places(found)
+    ]
     known = [gain for gain in gains if gain is not None]
     ps = iter(sensitivity.holm([gain.p for gain in known]))
     rows: list[tuple[Cell, ...]] = [
@@ -168,7 +179,8 @@ def held_out(found: Found) -> Table:
         digits=3,
         note='The gain over the default on sequences that took no part in choosing: what is better '
         'where it was chosen and not here was luck. p is of a gain as far from 0 by chance (signs '
-        'of the differences dealt out anew), held against the number of settings (Holm).',
+        'of the differences dealt out anew to recordings), held against the number of settings '
+        '(Holm).',
         quoted='default',
     )  # fmt: skip
 
@@ -189,7 +201,7 @@ def parameters(found: Found) -> Table:
         )  # fmt: skip
     rows.sort(key=lambda row: -float(row[4] or 0))
     chance = (
-        'its values are dealt out anew within each sequence'
+        'its values are dealt out anew within each recording'
         if found.whole_grid
         else 'its values are dealt out anew among settings'
     )
@@ -219,7 +231,7 @@ def best_settings(found: Found) -> Table:
     ]  # fmt: skip
     for index in best(found.tried, SHOWN, found.sign):
         difference = found.tried[1 + index] - found.tried[0]
-        gain = sensitivity.gain(difference)
+        gain = sensitivity.gain(difference, found.tried_of)
         one = found.settings[index]
         rows.append(
             (
@@ -266,7 +278,7 @@ def effect(found: Found, axis: Axis) -> tuple[list[str], sensitivity.Effect]:
         which = np.array([labels.index(t) for t in texts], np.int64)
     # A grid of which settings failed is no whole grid any more.
     balanced = found.whole_grid and len(kept) == len(found.settings)
-    return labels, sensitivity.effect(table, which, balanced)
+    return labels, sensitivity.effect(table, which, balanced, found.tried_of)
 
 
 def settings_csv(found: Found) -> str:
@@ -298,4 +310,6 @@ def _values(found: Found, one: Setting) -> list[str]:
 
 
 def _interval(found: Found, low: float, high: float) -> str:
+    if math.isnan(low):
+        return ''
     return f'{found.scale * low:+.2f} to {found.scale * high:+.2f}'

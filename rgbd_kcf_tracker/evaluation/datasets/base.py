@@ -126,6 +126,8 @@ class Sequence:
         categories: Princeton's splits, as far as known.
         origin: pixel coordinate of the first column and row in the data set's files, 0 or 1.
         path: where it lies; None for simulated scenes.
+        recording: which one it is of; several people of one are a sequence each. By default of
+            what lies at ``path``, or its own.
     """
 
     name: str
@@ -138,8 +140,12 @@ class Sequence:
     categories: Mapping[str, str] = field(default_factory=dict)
     origin: int = 0
     path: Path | None = None
+    recording: str = ''
 
     def __post_init__(self) -> None:
+        if not self.recording:
+            own = self.name if self.path is None else str(self.path)
+            object.__setattr__(self, 'recording', own)
         # Names of files need not be UTF-8, those in tables do.
         for field_name in ('name', 'scenario'):
             text = getattr(self, field_name).encode('utf-8', 'surrogateescape')

@@ -5,11 +5,13 @@
 
 Scores are ``(S, Q)``: ``S`` settings on the same ``Q`` sequences. Chance is what comes out when
 labels are dealt out anew (Fisher 1935, permutation tests); several tests at once are held against
-Holm's (1979) bounds.
+Holm's (1979) bounds. Sequences of one recording, such as the people in it, are not independent:
+they are drawn and dealt out together.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +36,7 @@ class Effect:
 
     Attributes:
         means: ``(V,)`` mean score at each of its values, over all else.
-        low, high: ``(V,)`` 95 % interval of these means over sequences (bootstrap).
+        low, high: ``(V,)`` 95 % interval of these means, see :func:`bootstrap`.
         share: of the variance between settings that its values explain, 0 to 1.
         p: of a share as large by chance.
     """
@@ -51,16 +53,23 @@ class Effect:
         return float(np.ptp(self.means))
 
 
-def effect(scores: FloatArray, labels: Labels, balanced: bool) -> Effect:
+def numbered(recordings: Sequence[str]) -> Labels:
+    """``(Q,)`` which recording each sequence is of, counted from 0, by the names of these."""
+    known = {name: number for number, name in enumerate(dict.fromkeys(recordings))}
+    return np.array([known[name] for name in recordings], np.int64)
+
+
+def effect(scores: FloatArray, labels: Labels, balanced: bool, recordings: Labels) -> Effect:
     """What the values of one parameter do.
 
     Args:
         scores: ``(S, Q)``, no NaN.
         labels: ``(S,)`` which of ``V`` values each setting has, every value at least once.
         balanced: True for a whole grid, in which each value meets all others alike: then values
-            are dealt out anew within every sequence, and chance is that of the sequences. False
+            are dealt out anew within every recording, and chance is that of the recordings. False
             for settings drawn at random: then they are dealt out among settings, and chance is
             that of what else these settings have.
+        recordings: ``(Q,)`` which one each sequence is of.
     """
     rng = np.random.default_rng(SEED)
     weights = (labels == np.arange(labels.max() + 1)[:, None]).astype(np.float64)
@@ -70,14 +79,17 @@ def effect(scores: FloatArray, labels: Labels, balanced: bool) -> Effect:
     overall = scores.mean(axis=1)
     total = float(np.var(overall))
     chance = np.empty(ROUNDS)
+    _, own = np.unique(recordings, return_inverse=True)
+    order = np.tile(np.arange(len(counts))[:, None], own.max() + 1)
     for i in range(ROUNDS):
         if balanced:
-            means = rng.permuted(by_value, axis=0).mean(axis=1)
+            dealt_out = rng.permuted(order, axis=0)[:, own]
+            means = np.take_along_axis(by_value, dealt_out, axis=0).mean(axis=1)
         else:
             dealt = weights[:, rng.permutation(len(labels))]
             means = dealt @ overall / counts
         chance[i] = _between(means, counts)
-    low, high = bootstrap(by_value)
+    low, high = bootstrap(by_value, recordings)
     return Effect(
         by_value.mean(axis=1),
         low,
@@ -92,8 +104,8 @@ class Gain:
     """By how much a setting is better than another.
 
     Attributes:
-        mean: over independent sequences.
-        low, high: its 95 % interval.
+        mean: over sequences.
+        low, high: its 95 % interval, see :func:`bootstrap`.
         p: of a mean as far from 0 by chance (signs dealt out anew).
     """
 
@@ -103,11 +115,12 @@ class Gain:
     p: float
 
 
-def gain(differences: FloatArray) -> Gain | None:
-    """Whether a setting is better than another on independent sequences.
+def gain(differences: FloatArray, recordings: Labels) -> Gain | None:
+    """Whether a setting is better than another on independent recordings.
 
     Args:
         differences: ``(Q,)`` of the scores of the two.
+        recordings: ``(Q,)`` which one each sequence is of.
 
     Returns:
         None where one of them is not known.
@@ -116,18 +129,31 @@ def gain(differences: FloatArray) -> Gain | None:
         return None
     rng = np.random.default_rng(SEED)
     mean = float(differences.mean())
-    signs = rng.choice([-1.0, 1.0], (ROUNDS, len(differences)))
-    low, high = bootstrap(differences[None])
+    _, own = np.unique(recordings, return_inverse=True)
+    signs = rng.choice([-1.0, 1.0], (ROUNDS, own.max() + 1))[:, own]
+    low, high = bootstrap(differences[None], recordings)
     p = _p(abs(mean), np.abs((signs * differences).mean(axis=1)))
     return Gain(mean, float(low[0]), float(high[0]), p)
 
 
-def bootstrap(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """95 % interval of each row's mean, its ``Q`` columns drawn anew."""
+def bootstrap(rows: FloatArray, recordings: Labels) -> tuple[FloatArray, FloatArray]:
+    """95 % interval of each row's mean, recordings drawn anew with all of their columns.
+
+    Args:
+        rows: ``(R, Q)``, no NaN.
+        recordings: ``(Q,)`` which one each column is of.
+
+    Returns:
+        ``(R,)`` each; NaN below two recordings, which say nothing of others.
+    """
+    numbers, sizes = np.unique(recordings, return_counts=True)
+    if len(numbers) < 2:
+        unknown = np.full(len(rows), np.nan)
+        return unknown, unknown
+    sums = rows @ (recordings[:, None] == numbers).astype(np.float64)
     rng = np.random.default_rng(SEED)
-    columns = rows.shape[1]
-    drawn = rng.integers(columns, size=(ROUNDS, columns))
-    means = np.stack([rows[:, own].mean(axis=1) for own in drawn])
+    drawn = rng.integers(len(numbers), size=(ROUNDS, len(numbers)))
+    means = np.stack([sums[:, own].sum(axis=1) / sizes[own].sum() for own in drawn])
     low, high = np.percentile(means, [2.5, 97.5], axis=0)
     return low, high
 
