@@ -110,6 +110,14 @@ def test_long_term_without_boxes_or_sequences():
     assert math.isnan(longterm.evaluate([]).f_score)
 
 
+def test_long_term_leaves_out_where_the_target_never_shows():
+    good = longterm.scored([A] * 4, np.full(4, 0.8), [A] * 4)
+    nobody = longterm.scored([None, A], np.array([0.0, 0.9]), [None, None])
+    result = longterm.evaluate([good, nobody])
+    assert (result.precision, result.recall, result.f_score) == (1, 1, 1)
+    assert math.isnan(longterm.evaluate([nobody]).f_score)
+
+
 def test_many_scores_give_at_most_a_hundred_thresholds():
     thresholds = longterm.score_thresholds(np.linspace(0, 1, 5000))
     assert len(thresholds) == 100

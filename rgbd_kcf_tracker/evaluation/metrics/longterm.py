@@ -88,11 +88,10 @@ def precision_recall(
     """Precision and recall of one sequence at each threshold.
 
     Precision is the mean overlap of the boxes whose score is at least the threshold (1 without
-    any), recall their summed overlap over the number of frames in which the target shows (0 where
-    it never shows).
+    any), recall their summed overlap over the number of frames in which the target shows.
 
     Args:
-        sequence: the boxes and their scores.
+        sequence: the boxes and their scores; the target shows in some frame.
         thresholds: ``(T,)``.
 
     Returns:
@@ -102,12 +101,16 @@ def precision_recall(
     boxes = kept.sum(axis=0)
     overlap = (sequence.overlaps[:, None] * kept).sum(axis=0)
     precisions: FloatArray = np.where(boxes > 0, overlap / np.maximum(boxes, 1), 1.0)
-    recalls: FloatArray = overlap / max(sequence.visible, 1)
+    recalls: FloatArray = overlap / sequence.visible
     return precisions, recalls
 
 
 def evaluate(sequences: Sequence[ScoredSequence], resolution: int = RESOLUTION) -> LongTerm:
-    """Mean precision and recall over sequences at common thresholds, and the best F-score."""
+    """Mean precision and recall over sequences at common thresholds, and the best F-score.
+
+    Sequences in which the target never shows have no recall, and do not count.
+    """
+    sequences = [s for s in sequences if s.visible]
     if not sequences:
         empty = np.zeros(0)
         return LongTerm(empty, empty, empty, math.nan, math.nan, math.nan)
