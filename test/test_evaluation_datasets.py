@@ -460,6 +460,9 @@ def test_thinning_out_keeps_the_asked_rate():
     assert [s.frame.stamp_ns for s in at_rate(map(sample, [0, 900, 950, 2000]), 10)] == [
         0, 900_000_000, 2_000_000_000,
     ]  # fmt: skip
+    jumps = [8000, 8040, 8100, 2000, 2040, 2100]
+    kept = [s.frame.stamp_ns // 1_000_000 for s in at_rate(map(sample, jumps), 10)]
+    assert kept == [8000, 8100, 2000, 2100], 'time jumped back: it does not wait until it is again'
 
 
 def test_dropping_depth_and_starting_at_the_first_box():

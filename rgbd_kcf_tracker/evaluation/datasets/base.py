@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.errors import DatasetError, ParameterError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.files import listing
+from rgbd_kcf_tracker.recordings.pairing import JUMP_BACK_S
 
 CLEAR_FRACTION = 0.5
 """A target is clearly in view where at least this share of it shows."""
@@ -178,7 +179,9 @@ def with_intrinsics(samples: Iterable[Sample], intrinsics: Intrinsics) -> Iterat
 
 
 def at_rate(samples: Iterable[Sample], rate_hz: float) -> Iterator[Sample]:
-    """The samples thinned out to at most ``rate_hz``, by their stamps; the first always stays.
+    """The samples thinned out to at most ``rate_hz``, by their stamps.
+
+    The first always stays, and so does the first after time jumped back.
 
     Raises:
         ParameterError: for a rate that is not above 0.
@@ -187,8 +190,12 @@ def at_rate(samples: Iterable[Sample], rate_hz: float) -> Iterator[Sample]:
         raise ParameterError(f'rate is {rate_hz:g} Hz: it must be above 0')
     period = 1e9 / rate_hz
     due: float | None = None
+    last = 0
     for sample in samples:
         stamp = sample.frame.stamp_ns
+        if stamp < last - JUMP_BACK_S * 1e9:
+            due = None
+        last = stamp
         # A tenth of a period early is on time: stamps are rounded, and cameras jitter.
         if due is not None and stamp < due - period / 10:
             continue
