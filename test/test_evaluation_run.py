@@ -263,6 +263,9 @@ def test_names_become_file_names():
     assert slug('filinha/A_bald') == 'filinha_A_bald'
     assert slug('metric without color') == 'metric_without_color'
     assert slug('../..') == '_'
+    assert slug('a _/b\udcff') == 'a_b'
+    assert (slug('日本/5'), slug('中国'), slug('Zoë')) == ('日本_5', '中国', 'Zoë')
+    assert slug('हि') != slug('हु'), 'vowels are marks'
 
 
 # --- boxes in files

@@ -201,6 +201,7 @@ def test_names_tell_recordings_apart():
     assert names(['/d/mon/bag.mcap', '/d/tue/bag.mcap', '/d/c']) == ['mon_bag', 'tue_bag', 'c']
     assert names(['/d/walk', '/d/walk.mcap']) == ['d_walk', 'd_walk.mcap']
     assert len(set(names(['/a/b_c', '/a_b/c', '/x/c']))) == 3
+    assert names(['/d/日本.mcap', '/d/中国.mcap']) == ['日本', '中国']
     with pytest.raises(ParameterError, match='rename one'):
         names(['/d/a b', '/d/a_b'])
 

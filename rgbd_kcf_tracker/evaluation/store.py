@@ -14,6 +14,7 @@ import io
 import json
 import math
 import re
+import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -83,8 +84,12 @@ def left_by_a_run() -> Iterator[None]:
 
 
 def slug(name: str) -> str:
-    """A name as a file's: other characters than letters, digits, dots and dashes replaced."""
-    return re.sub(r'[^A-Za-z0-9.=-]+', '_', name).strip('._') or '_'
+    """A name as a file's: other characters than letters, digits, dots and dashes replaced.
+
+    Letters of any script stay, with the marks that belong to them.
+    """
+    kept = (c if c in '.=-' or unicodedata.category(c)[0] in 'LMN' else '_' for c in name)
+    return re.sub('_+', '_', ''.join(kept)).strip('._') or '_'
 
 
 def write_json(path: Path, value: Any, indent: int | None = None) -> None:
