@@ -93,6 +93,9 @@ def test_people_are_where_they_are_seen_and_gone_where_they_are_not(
     here = view.seen(Annotation(7, Box(20.0, 40.0, 30.0, 60.0)))
     assert here is not None
     assert here.counts
+    whole = view.seen(Annotation(7, Box(20.0, 40.0, 30.0, 20.0), body=Box(20.0, 40.0, 30.0, 60.0)))
+    assert whole is not None
+    assert whole.body == here.box
     assert view.seen(Annotation(7, Box(170.0, 40.0, 30.0, 60.0))) is None
     edge = view.width + (CAMERA.cx - view.camera.cx) - 38  # a fifth of them shows there
     some = view.seen(Annotation(7, Box(edge - 8.0, 40.0, 40.0, 60.0)))

@@ -14,6 +14,7 @@ import pytest
 from rgbd_kcf_tracker.bench import spoilt
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import Sample
+from rgbd_kcf_tracker.geometry import Box
 
 
 @pytest.fixture
@@ -28,6 +29,7 @@ def recording(tmp_path: Path) -> Path:
         cv2.imwrite(str(folder / 'rgb' / f'{number}.png'), color)
         cv2.imwrite(str(folder / 'depth' / f'{number}.png'), depth + number)
     (folder / 'mot.txt').write_text('1,7,3,5,10,20,1,0,0,3\n3,7,9,5,10,20,1,0,0,3\n')
+    (folder / 'body_7.txt').write_text('3,5,10,30\n6,5,10,30\n9,5,10,30\n')
     return folder
 
 
@@ -67,6 +69,23 @@ def test_frames_are_lost_and_the_others_keep_their_times(recording: Path, tmp_pa
         old = before[times.index(new.frame.stamp_ns)]
         assert np.array_equal(old.frame.color, new.frame.color)
         assert old.people == new.people
+
+
+def test_copies_in_which_nobody_is_left_are_said(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    (recording / 'mot.txt').write_text('3,7,9,5,10,20,1,0,0,3\n')
+    assert spoilt.main([str(recording), '--out', str(tmp_path / 'o'), '--how', 'lost=0.99']) == 2
+    assert capsys.readouterr().err == f'{tmp_path / "o" / "room"}: nobody is left in its frames\n'
+
+
+def test_whole_bodies_are_known_of_a_copy_too(recording: Path, tmp_path: Path):
+    _, after = copied(recording, tmp_path, 'reach')
+    (person,) = after[0].people
+    assert person.body == Box(3, 5, 10, 30)
+    (alone,) = open_dataset(str(tmp_path / 'out' / 'room'), DatasetOptions(fps=5))
+    assert [s.body for s in alone.open().samples] == [Box(3, 5, 10, 30), None, Box(9, 5, 10, 30)]
+    assert tmp_path / 'out' / 'room' / 'body_7.txt' in alone.content
 
 
 @pytest.mark.parametrize('how', ['grey', 'holes=0.5', 'dark=60', 'fringe=5', 'shift=6'])

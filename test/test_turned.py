@@ -34,6 +34,8 @@ def recording(tmp_path: Path) -> Path:
     (folder / 'mot.txt').write_text(
         ''.join(f'{n},7,{3 * n},5,10,20,{int(n != 4)},0,0,3\n' for n in range(1, 5))
     )
+    bodies = (f'{3 * n},5,10,30\n' for n in range(1, FRAMES + 1))
+    (folder / 'body_7.txt').write_text(''.join(bodies))
     return folder
 
 
@@ -65,6 +67,8 @@ def test_copies_are_mirrored_and_backwards(recording: Path, tmp_path: Path):
             WIDTH - x - 10 if mirror else x for x in there
         ]
         assert [len(each) for each in lefts] == [int(n < 4) for n in order]
+        bodies = [(p.body.x, p.body.height) for s in samples for p in s.people]
+        assert bodies == [(x, 30) for each in lefts for x in each]
         assert [p.counts for s in samples for p in s.people] == [n != 3 for n in order if n < 4]
         assert samples[0].frame.intrinsics is not None
         assert samples[0].frame.intrinsics.cx == (WIDTH - 1 - 20 if mirror else 20)

@@ -108,19 +108,25 @@ class View:
 
     def seen(self, one: Annotation) -> Annotation | None:
         """Somebody as it shows them, None where it does not."""
-        box = one.box
+        whole = self._moved(one.box)
+        part = None if whole is None else whole.clipped(self.width, self.height)
+        if whole is None or part is None:
+            return None
+        share = part.area / whole.area
+        if share <= SHOWS:
+            return None
+        body = None if one.body is None else self._moved(one.body)
+        counts = one.counts and share > 3 * SHOWS
+        return dataclasses.replace(one, box=part, counts=counts, body=body)
+
+    def _moved(self, box: Box) -> Box | None:
         middle = box.x + box.width / 2, box.y + box.height / 2
         columns = np.array([box.x, box.right, middle[0], middle[0]])
         rows = np.array([middle[1], middle[1], box.y, box.bottom])
         at, ahead = _through(columns, rows, self._of, self.camera, self._turn.T)
         if (ahead <= 0).any():  # beside the camera, or behind it
             return None
-        whole = Box.from_corners(at[0, 0], at[2, 1], at[1, 0], at[3, 1])
-        part = whole.clipped(self.width, self.height)
-        share = 0.0 if part is None else part.area / whole.area
-        if part is None or share <= SHOWS:
-            return None
-        return dataclasses.replace(one, box=part, counts=one.counts and share > 3 * SHOWS)
+        return Box.from_corners(at[0, 0], at[2, 1], at[1, 0], at[3, 1])
 
 
 def _through(

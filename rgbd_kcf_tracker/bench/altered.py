@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, Sightings, mot_text
 from rgbd_kcf_tracker.recordings.outputs import cannot_write, check_outputs, make_folder
-from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS
+from rgbd_kcf_tracker.recordings.textfiles import INTRINSICS, format_box
 
 
 def parser_of(command: str, doc: str | None) -> argparse.ArgumentParser:
@@ -169,15 +169,20 @@ def read_with_depth(
 
 
 def write_truth(
-    out: Path, stamps_ns: Sequence[int], people: Sequence[Iterable[Annotation]]
+    out: Path, stamps_ns: Sequence[int], people: Sequence[Sequence[Annotation]]
 ) -> None:
-    """Write when the frames of a copy were taken, and who is in them.
+    """Write when the frames of a copy were taken, and who is in them, whole bodies where known.
 
     Args:
         out: the copy.
         stamps_ns: of its frames.
         people: in each of them.
+
+    Raises:
+        RecordingError: where nobody is.
     """
+    if not any(people):
+        raise RecordingError(f'{out}: nobody is left in its frames')
     rows = [
         (number, person.id, person.box.as_tuple(), float(person.counts))
         for number, there in enumerate(people)
@@ -185,3 +190,7 @@ def write_truth(
     ]
     (out / 'timestamps.txt').write_text(''.join(f'{stamp}\n' for stamp in stamps_ns))
     (out / MOT_FILE).write_text(mot_text(Sightings.of(*zip(*rows, strict=True))))
+    for who in {person.id for there in people for person in there if person.body is not None}:
+        bodies = [next((p.body for p in there if p.id == who), None) for there in people]
+        text = ''.join(f'{format_box(body)}\n' for body in bodies)
+        (out / f'body_{who}.txt').write_text(text)

@@ -82,9 +82,11 @@ def turn(
 
 
 def _mirrored(one: Annotation, width: int) -> Annotation:
-    box = one.box
-    turned = Box(width - box.right, box.y, box.width, box.height)
-    return dataclasses.replace(one, box=turned)
+    def turned(box: Box) -> Box:
+        return Box(width - box.right, box.y, box.width, box.height)
+
+    body = None if one.body is None else turned(one.body)
+    return dataclasses.replace(one, box=turned(one.box), body=body)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -128,7 +128,7 @@ def _find_ids(path: Path, fps: float) -> list[Sequence]:
             kind='folder',
             open=partial(load_id, path, int(who), fps),
             identity=f'folder:{who}:{fps}',
-            content=files,
+            content=(*files, path / f'body_{who}.txt'),
             path=path,
         )
         for who in np.unique(rows.ids[clear])
@@ -138,7 +138,8 @@ def _find_ids(path: Path, fps: float) -> list[Sequence]:
 def load_id(path: Path, who: int, fps: float) -> Opened:
     """Open one person of ``mot.txt``, as :func:`load` does one of several.
 
-    A frame in which the person is barely visible (score 0) does not count.
+    A frame in which the person is barely visible (score 0) does not count. The whole body is in
+    ``body_ID.txt``, where it is known.
 
     Raises:
         DatasetError: where the person is never clearly in view.
@@ -150,6 +151,7 @@ def load_id(path: Path, who: int, fps: float) -> Opened:
     clear = rows.frames[rows.scores > 0]
     if not len(clear):
         raise DatasetError(f'{path / MOT_FILE}: id {who} is never clearly in view')
+    body = _read_bodies(path / f'body_{who}.txt', images)
     boxes: list[Box | None] = [None] * len(images)
     judged = [True] * len(images)
     for row, frame in enumerate(rows.frames):
@@ -160,11 +162,16 @@ def load_id(path: Path, who: int, fps: float) -> Opened:
     frames = read_frames(path, images, fps, warnings.append)
 
     def samples() -> Iterator[Sample]:
-        for number, sample in enumerate(with_truth(frames, boxes, None, None, start, end), start):
+        for number, sample in enumerate(with_truth(frames, boxes, body, None, start, end), start):
             yield dataclasses.replace(sample, judged=judged[number])
 
     return Opened(
-        samples(), length=end - start, start=start, total=len(images), warnings=tuple(warnings)
+        samples(),
+        length=end - start,
+        start=start,
+        total=len(images),
+        has_body=body is not None,
+        warnings=tuple(warnings),
     )
 
 
@@ -183,11 +190,7 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         raise DatasetError(f'{path} has no {truth_path.name}: nothing to measure against')
     boxes = read_boxes(truth_path)
     check_lengths(truth_path, len(boxes), images, images[0].parent)
-    body = None
-    body_path = _body_file(truth_path) if person else path / _BODY
-    if body_path.exists():
-        body = read_boxes(body_path)
-        check_lengths(body_path, len(body), images, images[0].parent)
+    body = _read_bodies(_body_file(truth_path) if person else path / _BODY, images)
     fractions = None
     if visible_path.exists():
         fractions = read_fractions(visible_path)
@@ -221,6 +224,15 @@ def _colors(path: Path) -> Path:
 def _body_file(truth_path: Path) -> Path:
     """``body_PERSON.txt`` beside ``groundtruth_PERSON.txt``."""
     return truth_path.with_name(truth_path.name.replace('groundtruth', 'body', 1))
+
+
+def _read_bodies(path: Path, images: tuple[Path, ...]) -> list[Box | None] | None:
+    """The whole body in each frame; None where there is no such file."""
+    if not path.exists():
+        return None
+    bodies = read_boxes(path)
+    check_lengths(path, len(bodies), images, images[0].parent)
+    return bodies
 
 
 def read_fractions(path: Path) -> list[float]:
