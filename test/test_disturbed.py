@@ -45,6 +45,14 @@ def test_a_copy_has_other_light_and_noise_and_the_same_truth(recording: Path, tm
     assert abs(means[0][0] - means[1][0]) > 1
 
 
+def test_the_truth_of_the_challenges_own_folders_is_kept(recording: Path, tmp_path: Path):
+    (recording / 'gt').mkdir()
+    (recording / 'mot.txt').rename(recording / 'gt' / 'gt.txt')
+    assert disturbed.main([str(recording), '--out', str(tmp_path / 'out'), '--copies', '1']) == 0
+    copy = tmp_path / 'out' / '1_room'
+    assert (copy / 'gt' / 'gt.txt').read_text() == (recording / 'gt' / 'gt.txt').read_text()
+
+
 def test_nothing_is_written_over_and_what_is_no_recording_is_said(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):

@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.bench.altered import (
     write_image,
 )
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.evaluation.datasets.everyone import image_folder
+from rgbd_kcf_tracker.evaluation.datasets.everyone import CHALLENGE_FILE, image_folder
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_frames
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.imagefiles import image_files
@@ -55,10 +55,11 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
     if colors is None or not (folder / 'depth').is_dir():
         raise RecordingError(f'{folder} holds no folders of colour and depth images')
     frames = read_frames(folder, image_files(colors), fps=1.0)
-    make_copy(out, colors.name, 'depth')
-    for path in folder.iterdir():
-        if path.is_file():
-            shutil.copyfile(path, out / path.name)
+    files = [p for p in (*folder.iterdir(), folder / CHALLENGE_FILE) if p.is_file()]
+    beside = {p.parent.name for p in files if p.parent != folder}
+    make_copy(out, colors.name, 'depth', *beside)
+    for path in files:
+        shutil.copyfile(path, out / path.relative_to(folder))
     green = STRONGER * rng.standard_normal()
     blue, red = green + TINTED * rng.standard_normal(2)
     gain = np.exp([blue, green, red])

@@ -38,7 +38,7 @@ from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, read_boxes
 
 IMAGE_FOLDERS = ('rgb', 'color', 'img1', 'img')
-_CHALLENGE = Path('gt') / 'gt.txt'
+CHALLENGE_FILE = Path('gt') / 'gt.txt'
 _INFO = 'seqinfo.ini'
 
 People = dict[int, list[Annotation]]
@@ -96,10 +96,10 @@ def read(path: Path, fps: float) -> tuple[ImageFrames, People]:
     truth = _truth_files(path)
     if not truth:
         raise DatasetError(
-            f'{path} does not say who is where: expected {MOT_FILE}, {_CHALLENGE} or '
+            f'{path} does not say who is where: expected {MOT_FILE}, {CHALLENGE_FILE} or '
             'groundtruth_PERSON.txt for each'
         )
-    together = truth[0].name in (MOT_FILE, _CHALLENGE.name)
+    together = truth[0].name in (MOT_FILE, CHALLENGE_FILE.name)
     if together:
         people = _from_mot(truth[0], path, images, folder)
     else:
@@ -162,7 +162,7 @@ def image_folder(path: Path) -> Path | None:
 
 
 def _truth_files(path: Path) -> list[Path]:
-    for name in (path / MOT_FILE, path / _CHALLENGE):
+    for name in (path / MOT_FILE, path / CHALLENGE_FILE):
         if name.is_file():
             return [name]
     return people_files(path)
