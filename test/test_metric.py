@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -270,6 +271,21 @@ def test_depth_that_comes_and_goes():
         return Frame(frame.color, None if dark else frame.depth, frame.stamp_ns, frame.intrinsics)
 
     assert follow(scene('normal'), flicker).success > 0.8
+
+
+def test_what_somebody_has_left_whom_it_was_one_figure_with_is_nobody_as_it_does_not_stir():
+    """A bookshelf that somebody of the same depth stood before in the first frames."""
+    targets = TargetSet('metric')
+    targets.everyone = True
+    wrong = []
+    for sample in islice(simulate('group_crossing', seed=921, rate_hz=10.0, size=(320, 240)), 41):
+        there = [truth.visible for truth in sample.truths.values() if truth.visible is not None]
+        boxes = [track.box for track in targets.update(sample.frame).values()]
+        wrong.append(
+            sum(all(box.iou(one) < 0.3 for one in there) for box in boxes if box is not None)
+        )
+    assert max(wrong) > 0
+    assert wrong[35:] == [0] * 6
 
 
 @pytest.mark.slow

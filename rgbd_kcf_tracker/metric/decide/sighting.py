@@ -110,4 +110,9 @@ def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
     if person.upright and math.dist(account.place(seen), person.place) > LEAP:
         return Calm(seen, scene.view, scene.image, account.time)
     calm = person.calm
-    return calm if calm is not None and calm.holds(seen, scene.image) else None
+    if calm is not None and calm.holds(seen, scene.image):
+        return calm
+    if person.doubted:
+        k, top = scene.view.intrinsics, account.look(seen).top
+        person.doubted = person.travelled <= TRAVELLED and not upright(seen, k, top)
+    return Calm(seen, scene.view, scene.image, account.time) if person.doubted else None
