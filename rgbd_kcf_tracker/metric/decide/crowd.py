@@ -28,7 +28,7 @@ from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
-from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, find_figures
@@ -291,7 +291,6 @@ class Crowd:
                 place is learned from that.
         """
         people, time = account.people, account.time
-        stood = [(person, person.last) for person in people if _only_by_shape(person)]
         for row, person in enumerate(people):
             if person.number not in targets:
                 continue
@@ -328,7 +327,6 @@ class Crowd:
         for person in people:
             if person.seen_at < time:
                 person.missed(account.scene.view.depth)
-        _doubt_what_is_left(account, stood)
         self._introduce(account, {n: None if n in unsure else s for n, s in targets.items()})
         self._reunite(account)
         self._comebacks.hear(account, self.people)
@@ -452,31 +450,6 @@ def _followed(account: Account) -> tuple[list[Followed], list[Missing]]:
         if row not in account.owner and person.alive and person.gallery.views
     ]
     return here, gone
-
-
-def _only_by_shape(person: Person) -> bool:
-    """Whether somebody is a person because he looked like one, and has never walked."""
-    return person.upright and not person.chosen and person.travelled <= TRAVELLED
-
-
-def _doubt_what_is_left(account: Account, stood: list[tuple[Person, Silhouette | None]]) -> None:
-    """Doubt whoever somebody new came out of, if he has not a person's shape any more.
-
-    He and what he touched may have been one figure until now.
-
-    Args:
-        account: of the frame.
-        stood: those who were people by their shape alone, and where they were a frame ago.
-    """
-    new = [each for each in account.owners if each.first_seen == account.time]
-    for person, before in stood:
-        if before is None or person.seen_at < account.time or person in new:
-            continue
-        person.doubted |= any(
-            each.last is not None
-            and np.count_nonzero(each.last.common(before)) > 0.5 * np.count_nonzero(each.last.mask)
-            for each in new
-        )
 
 
 def _is_head(account: Account, column: int) -> bool:

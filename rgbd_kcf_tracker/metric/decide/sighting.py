@@ -112,7 +112,8 @@ def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
     calm = person.calm
     if calm is not None and calm.holds(seen, scene.image):
         return calm
-    if person.doubted:
-        k, top = scene.view.intrinsics, account.look(seen).top
-        person.doubted = person.travelled <= TRAVELLED and not upright(seen, k, top)
-    return Calm(seen, scene.view, scene.image, account.time) if person.doubted else None
+    # Who was a person by his shape alone may have been one figure with what he touched.
+    by_shape = person.upright and not person.chosen and person.travelled <= TRAVELLED
+    if by_shape and not upright(seen, scene.view.intrinsics, account.look(seen).top):
+        return Calm(seen, scene.view, scene.image, account.time)
+    return None

@@ -83,7 +83,6 @@ class Person:
         upright: whether it ever had the shape of a person.
         figure: whether it was a figure when it was last seen, and not a thing too small for one.
         calm: what it was found as elsewhere than where it had been, until that stirs.
-        doubted: whether it may be what somebody had touched who came out of it.
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
@@ -102,7 +101,6 @@ class Person:
         self.met: set[int] = set()
         self.last: Silhouette | None = None
         self.calm: Calm | None = None
-        self.doubted = False
         self.area, self.again = 0.0, -math.inf
         self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
@@ -224,7 +222,6 @@ class Person:
             self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
             self.hidden, self.came = newcomer.hidden, newcomer.came
             self.figure, self.calm = newcomer.figure, newcomer.calm
-            self.doubted = newcomer.doubted
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright
@@ -247,7 +244,6 @@ class Person:
         self.misses, other.misses = other.misses, self.misses
         self.last, other.last = other.last, self.last
         self.calm, other.calm = other.calm, self.calm
-        self.doubted, other.doubted = other.doubted, self.doubted
         self.hidden, other.hidden = other.hidden, self.hidden
         self.figure, other.figure = other.figure, self.figure
         mine, his = self.gallery.taken_back(since), other.gallery.taken_back(since)
