@@ -190,6 +190,9 @@ def test_parts_of_different_runs_are_not_joined(tmp_path: Path, capsys):
     twice = [str(tmp_path / '1'), str(tmp_path / 'again')]
     assert main(['evaluate', '--merge', *twice, '--report', str(tmp_path / 'r')]) == 2
     assert 'are the same part with other results' in capsys.readouterr().err
+    part.write_text(part.read_text().replace('"recording":', '"of":'))
+    assert main(['evaluate', '--merge', *twice, '--report', str(tmp_path / 'r')]) == 2
+    assert 'written by another version: run all parts again' in capsys.readouterr().err
     assert main(['evaluate', '--merge', str(tmp_path), '--report', str(tmp_path / 'r')]) == 2
     assert 'holds no part' in capsys.readouterr().err
     (tmp_path / 'circle').symlink_to('circle')

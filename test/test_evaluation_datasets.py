@@ -359,6 +359,8 @@ def test_our_layout_with_another_name_of_the_colour_folder(own: Path, beside: st
     assert (first.stamp_ns == 100) == (beside == 'timestamps.txt')
     assert (first.intrinsics is not None) == (beside == 'intrinsics.json')
     assert open_dataset(str(own), DatasetOptions(kind='vot'))[0].kind == 'vot'
+    (own / 'sequence').write_text('fps=15\n')  # VOT's own file, whatever is beside it
+    assert open_dataset(str(own))[0].kind == 'vot'
 
 
 def test_our_layout_with_an_image_that_is_none(own: Path):

@@ -255,6 +255,22 @@ def test_copies_are_dropped_for_as_long_as_stamps_go_on() -> None:
     assert len(captures) == 30
 
 
+@pytest.mark.parametrize('gaps', [(205, 200, 200), (205, 1, 1, 1, 1), (20, 20, 200)])
+def test_an_image_that_is_sent_again_until_it_is_answered_is_one(gaps: tuple[int, ...]) -> None:
+    """As by a replay in lock-step; the frames after it, which come at once, are not late."""
+    made = intake()
+    now, captures = BASE, []
+    for gap in (0, *gaps):
+        now += gap * MS
+        captures += made.color(message(BASE, b'c'), now)
+        captures += made.depth(message(BASE, b'd'), now)
+    for index in range(1, 10):
+        stamp, now = BASE + index * 33 * MS, now + 10 * MS
+        captures += made.color(message(stamp, b'%d' % index), now)
+        captures += made.depth(message(stamp, b'%d' % index), now)
+    assert len(captures) == 10
+
+
 def test_counts_go_on_when_the_node_is_activated_again() -> None:
     statistics = Statistics()
     for activation in (0, 1):

@@ -707,6 +707,43 @@ def test_intrinsics_that_come_late_start_all_over_at_the_first_depth_with_all_in
     assert tracks[number].box.iou(left(19).box) > 0.8
 
 
+def test_all_does_not_start_over_long_after_the_intrinsics_have_come(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """One of two is hidden when they come, and for long: what was seen meanwhile is kept."""
+    restarts = []
+    monkeypatch.setattr(MetricTargets, '_start_over', lambda self, frame: restarts.append(frame))
+
+    def scene(i: int) -> Frame:
+        there = [left(0)] if 5 <= i < 60 else [left(0), right(0)]
+        return picture(there, STEP * i)
+
+    targets = TargetSet('metric')
+    for i in range(70):
+        frame = scene(i)
+        if i < 8:
+            frame = dataclasses.replace(frame, intrinsics=None)
+        if i == 0:
+            for one in (left(0), right(0)):
+                targets.add(frame, one.box)
+        else:
+            targets.update(frame)
+    assert restarts == []
+
+
+def test_everybody_keeps_his_id_when_all_starts_over():
+    targets = TargetSet('metric')
+    targets.everyone = True
+    ids = []
+    for i in range(14):
+        frame = both(i)
+        if i < 8:
+            frame = dataclasses.replace(frame, intrinsics=None)
+        ids.append({n for n, track in targets.update(frame).items() if track.box is not None})
+    assert len(ids[-1]) == 2
+    assert ids[7:] == [ids[7]] * 7
+
+
 def test_two_whose_boxes_overlap_are_two_when_all_starts_over():
     one = Someone(0.0, 3.0)
     targets = TargetSet('metric')

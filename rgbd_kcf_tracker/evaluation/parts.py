@@ -215,6 +215,8 @@ def _sequence(sequence: Sequence) -> dict[str, Any]:
 
 
 def _sequence_of(content: dict[str, Any]) -> Sequence:
+    if 'recording' not in content:  # nor are the results of an older version where they are now
+        raise DatasetError('a part was written by another version: run all parts again')
     return Sequence(open=partial(_elsewhere, content['name']), **content)
 
 

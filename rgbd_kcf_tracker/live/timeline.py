@@ -23,9 +23,10 @@ LARGEST_STEP_NS = 60 * NANOSECONDS
 """A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
 LEAST_STEP_NS = 1_000_000
 """Time goes on by this much at the least where a stamp does not."""
-COPY_NS = 200_000_000
-"""Copies of a message come within this time; the same picture later on, still of the same stamp,
-is one that stands still before a camera without a clock."""
+PACE_NS, STILL = (5_000_000, 100_000_000), 3
+"""Between two pictures of a camera, and how many that are all the same and have one stamp must have
+come so until they count: that camera has no clock and sees what stands still. Copies come at once,
+or after longer, as a replay in lock-step sends an image again until it is answered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,7 @@ class StampRepair:
 
     def __init__(self) -> None:
         self._stamp: int | None = None
-        self._since = 0  # when the first of that stamp came
+        self._came = self._paced = 0
         self._repaired = 0
         self._arrival = 0
         self._data: Any = None
@@ -92,12 +93,15 @@ class StampRepair:
     def __call__(self, stamp_ns: int, arrival_ns: int, data: Any) -> int | None:
         """The stamp to pair by; None where the message is the last one over again."""
         repaired = stamp_ns
+        gap, self._came = arrival_ns - self._came, arrival_ns
         if stamp_ns == self._stamp:
-            if arrival_ns - self._since < COPY_NS and _same(data, self._data):
-                return None
+            if _same(data, self._data):
+                self._paced = self._paced + 1 if PACE_NS[0] <= gap < PACE_NS[1] else 0
+                if self._paced <= STILL:
+                    return None
             repaired = self._repaired + max(arrival_ns - self._arrival, 1)
         else:
-            self._since = arrival_ns
+            self._paced = 0
         self._stamp, self._data = stamp_ns, data
         self._repaired, self._arrival = repaired, arrival_ns
         return repaired

@@ -80,6 +80,7 @@ class MetricTargets:
         self._frame: Frame | None = None
         self._camera: Intrinsics | None = None
         self._metres: Intrinsics | None = None
+        self._told_at: float | None = None
         self._size = 0, 0
 
     def __len__(self) -> int:
@@ -211,12 +212,20 @@ class MetricTargets:
             return False
         if self._size != (frame.width, frame.height):
             return False
-        same = abs(frame.intrinsics.fx / taken.fx - 1) < SAME_CAMERA
-        return not same and all(f.track.box is not None for f in self._followers.values())
+        if abs(frame.intrinsics.fx / taken.fx - 1) < SAME_CAMERA:
+            self._told_at = None
+            return False
+        if self._told_at is None:
+            self._told_at = self._time
+        elif self._time - self._told_at > SETTLE:  # by now most is remembered in the right ones
+            self._metres = frame.intrinsics
+            return False
+        return all(f.track.box is not None for f in self._followers.values())
 
     def _start_over(self, frame: Frame) -> None:
         """Start on all where they were a frame ago: what was remembered is in other metres."""
         before = {number: each.track for number, each in self._followers.items()}
+        others = self._others(frame) if self.everyone else {}
         self._reader, self._crowd = self._new_memory()
         self._names, self._followers, self._metres = {}, {}, None
         self._perceive(frame)
@@ -234,6 +243,22 @@ class MetricTargets:
             follower.track = dataclasses.replace(follower.first, id=number, score=track.score)
             if follower.person is not None:
                 self._names[follower.person.number] = number
+        if others and self.account is not None:
+            self._names |= self._names_again(self.account, others)
+
+    def _names_again(self, account: Account, before: dict[int, Track]) -> dict[int, int]:
+        """The ids of those whom nobody chose and who are where they were a frame ago."""
+        names: dict[int, int] = {}
+        for column, row in enumerate(account.owner):
+            if row < 0 or account.people[row].number in self._names:
+                continue
+            box = outline_box(account.scene, account.sights[column].figure.seen)
+            for name, track in before.items():
+                near = track.box is not None and track.box.iou(box) >= SAME_BOX
+                if near and name not in names.values():
+                    names[account.people[row].number] = name
+                    break
+        return names
 
     def _perceive(self, frame: Frame) -> float:
         dt = 0.0

@@ -68,9 +68,10 @@ def is_sequence(path: Path, asked: bool = False) -> bool:
         asked: this layout is asked for.
     """
     colors = color_folder(path)
-    return colors is not None and (
-        asked or colors.name == COLOR_FOLDERS[0] or any((path / n).is_file() for n in _PARTS)
-    )
+    if colors is None or asked or colors.name == COLOR_FOLDERS[0]:
+        return colors is not None
+    # VOT's own file says whose it is, whatever the user has put beside it.
+    return not (path / 'sequence').is_file() and any((path / n).is_file() for n in _PARTS)
 
 
 def find(path: Path, fps: float) -> list[Sequence]:
