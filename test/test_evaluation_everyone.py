@@ -317,6 +317,15 @@ def test_a_recording_with_mot_text(pair: Path):
     assert [s.number for s in samples] == list(range(8))
 
 
+def test_a_depth_image_that_is_missing_makes_a_frame_without_as_for_one_target(pair: Path):
+    (pair / 'depth').mkdir()
+    for number in (1, 2, 4, 5, 6, 7, 8):
+        cv2.imwrite(str(pair / 'depth' / f'{number:06d}.png'), np.full((48, 64), 2000, np.uint16))
+    sequence, samples = opened(pair)
+    assert [s.frame.depth is None for s in samples] == [n == 2 for n in range(8)]
+    assert '1 of 8 colour images have no depth image' in sequence.open().warnings[0]
+
+
 def test_a_file_for_each_person(tmp_path: Path):
     path = tmp_path / 'hall'
     images(path / 'rgb', 3)

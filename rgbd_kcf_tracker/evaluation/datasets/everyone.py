@@ -13,7 +13,7 @@ from __future__ import annotations
 import configparser
 import dataclasses
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -70,7 +70,8 @@ def find(path: Path, fps: float) -> list[Sequence]:
 
 def load(path: Path, fps: float) -> Opened:
     """Open a recording with everyone in it; see :func:`read`."""
-    frames, people = read(path, fps)
+    warnings: list[str] = []
+    frames, people = read(path, fps, warnings.append)
 
     def samples() -> Iterator[Sample]:
         nobody = [None] * len(frames)
@@ -79,11 +80,20 @@ def load(path: Path, fps: float) -> Opened:
             yield dataclasses.replace(sample, people=present)
 
     known = any(p.body is not None for present in people.values() for p in present)
-    return Opened(samples(), len(frames), total=len(frames), has_body=known)
+    return Opened(
+        samples(), len(frames), total=len(frames), has_body=known, warnings=tuple(warnings)
+    )
 
 
-def read(path: Path, fps: float) -> tuple[ImageFrames, People]:
+def read(
+    path: Path, fps: float, warn: Callable[[str], None] | None = None
+) -> tuple[ImageFrames, People]:
     """The frames of a recording, none of them decoded yet, and who is in them.
+
+    Args:
+        path: the recording.
+        fps: frames per second, where it has no stamps.
+        warn: see :func:`~.folder.read_frames`.
 
     Raises:
         DatasetError: where nobody is in it, or lines and images differ in number.
@@ -106,7 +116,7 @@ def read(path: Path, fps: float) -> tuple[ImageFrames, People]:
         people = _from_files(truth, images, folder)
     if not people:
         raise DatasetError(f'{truth[0]}: nobody is ever in view: nothing to measure against')
-    return read_frames(path, images, _challenge_rate(path) or fps), people
+    return read_frames(path, images, _challenge_rate(path) or fps, warn), people
 
 
 def _from_mot(path: Path, beside: Path, images: tuple[Path, ...], folder: Path) -> People:
