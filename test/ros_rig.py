@@ -254,6 +254,23 @@ def overrides(values: dict[str, Any]) -> list[Parameter]:
 
 
 @contextmanager
+def spinning(*nodes: Node) -> Iterator[None]:
+    """Nodes of one context in an executor and a thread of their own, as processes spin them."""
+    executor = SingleThreadedExecutor(context=nodes[0].context)
+    for node in nodes:
+        executor.add_node(node)
+    stop = threading.Event()
+    told = (executor, nodes[0], stop.is_set)
+    thread = threading.Thread(target=spin, args=told, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join(5)
+
+
+@contextmanager
 def running_node(
     rig: Rig, namespace: str = '', wait: bool = True, **values: Any
 ) -> Iterator[TrackerNode]:
@@ -265,20 +282,14 @@ def running_node(
     rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
     names = {name.replace('__', '.'): value for name, value in values.items()}
     node = TrackerNode(context=context, namespace=namespace, parameter_overrides=overrides(names))
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    stop = threading.Event()
-    thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
     if node.settings.autostart:
         node.autostart()
-    thread.start()
     try:
-        if node.settings.autostart and wait:
-            rig.await_listener(node)
-        yield node
+        with spinning(node):
+            if node.settings.autostart and wait:
+                rig.await_listener(node)
+            yield node
     finally:
-        stop.set()
-        thread.join(5)
         node.destroy_node()
         rclpy.shutdown(context=context)
 

@@ -245,14 +245,11 @@ class Server:
 @contextmanager
 def running(server: Server, **values: Any) -> Iterator[tuple[Any, Any]]:
     pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
-    import threading
 
     import rclpy
-    from rclpy.executors import SingleThreadedExecutor
-    from ros_rig import overrides
+    from ros_rig import overrides, spinning
 
     from rgbd_kcf_tracker.ros.follow_node import FollowNode
-    from rgbd_kcf_tracker.ros.process import spin
 
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
@@ -261,17 +258,10 @@ def running(server: Server, **values: Any) -> Iterator[tuple[Any, Any]]:
         parameter_overrides=overrides(values),
     )  # fmt: skip
     camera = rclpy.create_node('camera_and_tracker', context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    executor.add_node(camera)
-    stop = threading.Event()
-    thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
-    thread.start()
     try:
-        yield node, camera
+        with spinning(node, camera):
+            yield node, camera
     finally:
-        stop.set()
-        thread.join(5)
         node.destroy_node()
         camera.destroy_node()
         rclpy.shutdown(context=context)

@@ -27,8 +27,7 @@ import aiohttp
 import browser as browsers
 import numpy as np
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from ros_rig import Rig, overrides, play_hidden, running_node, scene
+from ros_rig import Rig, overrides, play_hidden, running_node, scene, spinning
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import Header
 
@@ -39,7 +38,6 @@ from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message, stamp_from_ns
-from rgbd_kcf_tracker.ros.process import spin
 from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
 from rgbd_kcf_tracker.view import live_page
 from rgbd_kcf_tracker.view.commands import Command
@@ -66,17 +64,11 @@ def running_viewer(**values: Any) -> Iterator[tuple[ViewerNode, Server]]:
     with made_viewer(**values) as node:
         server = Server(node.page, port=0)
         server.start()
-        executor = SingleThreadedExecutor(context=node.context)
-        executor.add_node(node)
-        stop = threading.Event()
-        thread = threading.Thread(target=spin, args=(executor, node, stop.is_set), daemon=True)
-        thread.start()
-        try:
-            yield node, server
-        finally:
-            server.stop()
-            stop.set()
-            thread.join(5)
+        with spinning(node):
+            try:
+                yield node, server
+            finally:
+                server.stop()
 
 
 class Look:

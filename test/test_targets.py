@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -665,6 +666,12 @@ def test_who_is_chosen_again_while_it_is_open_whether_he_has_come_back_keeps_his
         assert tracks[number].box.iou(Someone(1.0, 3.4).box) > 0.8
 
 
+def late(scene: Callable[[int], Frame], i: int) -> Frame:
+    """A frame of a camera whose intrinsics come with the one of index 8."""
+    frame = scene(i)
+    return frame if i >= 8 else dataclasses.replace(frame, intrinsics=None)
+
+
 def test_a_camera_whose_intrinsics_stop_coming_is_the_same_camera():
     answers = []
     wide = dataclasses.replace(CAMERA, fx=160.0, fy=160.0)
@@ -695,9 +702,7 @@ def test_intrinsics_that_come_late_start_all_over_at_the_first_depth_with_all_in
     )
     targets = TargetSet('metric')
     for i in range(20):
-        frame = scene(i)
-        if i < 8:
-            frame = dataclasses.replace(frame, intrinsics=None)
+        frame = late(scene, i)
         if i == 0:
             number = targets.add(frame, left(0).box)
         else:
@@ -720,9 +725,7 @@ def test_all_does_not_start_over_long_after_the_intrinsics_have_come(
 
     targets = TargetSet('metric')
     for i in range(70):
-        frame = scene(i)
-        if i < 8:
-            frame = dataclasses.replace(frame, intrinsics=None)
+        frame = late(scene, i)
         if i == 0:
             for one in (left(0), right(0)):
                 targets.add(frame, one.box)
@@ -731,14 +734,38 @@ def test_all_does_not_start_over_long_after_the_intrinsics_have_come(
     assert restarts == []
 
 
+def test_how_long_the_intrinsics_are_known_counts_from_the_images_of_that_size(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The target is hidden when the first come, and the camera then sends larger images."""
+    restarts = []
+    monkeypatch.setattr(MetricTargets, '_start_over', lambda self, frame: restarts.append(frame))
+
+    def scene(i: int) -> Frame:
+        frame = picture([] if 3 <= i < 10 else [left(0)], STEP * i)
+        k = 1 if i < 10 else 2
+        numbers = (k * each for each in (CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy))
+        told = 5 <= i < 10 or i >= 50
+        return Frame(
+            frame.color.repeat(k, 0).repeat(k, 1),
+            frame.depth.repeat(k, 0).repeat(k, 1),
+            frame.stamp_ns,
+            Intrinsics(*numbers) if told else None,
+        )
+
+    targets = TargetSet('metric')
+    targets.add(scene(0), left(0).box)
+    for i in range(1, 52):
+        targets.update(scene(i))
+    assert [frame.stamp_ns for frame in restarts] == [scene(i).stamp_ns for i in (50, 51)]
+
+
 def test_everybody_keeps_his_id_when_all_starts_over():
     targets = TargetSet('metric')
     targets.everyone = True
     ids = []
     for i in range(14):
-        frame = both(i)
-        if i < 8:
-            frame = dataclasses.replace(frame, intrinsics=None)
+        frame = late(both, i)
         ids.append({n for n, track in targets.update(frame).items() if track.box is not None})
     assert len(ids[-1]) == 2
     assert ids[7:] == [ids[7]] * 7

@@ -23,8 +23,6 @@ FIRST_PERIOD_S = 0.2
 second."""
 RECENT = 8
 """Images that are kept for sending again."""
-
-
 FRAME_NS = 33_333_333
 """Between two rounds of a single image."""
 LONGEST_NS = 1_000_000_000

@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.insight import Insight, insight_in
 from rgbd_kcf_tracker.live.settings import MOST_TARGETS
 from rgbd_kcf_tracker.live.story import Story, taken
+from rgbd_kcf_tracker.metric.targets import SAME_BOX
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
@@ -38,9 +39,6 @@ REQUESTS_CREDIT_S = 0.3
 """So much of it is saved up: a few requests in a row are met at once."""
 MOST_ADDITIONS = 50
 """Targets that wait to be added at most."""
-SAME = 0.5
-"""Overlap (intersection over union) with a target's box from which a box shows that target, as is
-common for matching boxes: of two of one size, each then holds two thirds of the other."""
 _ALREADY = 'what is in that box is followed already, as target {}'
 
 _warm: set[str] = set()
@@ -317,7 +315,7 @@ class Session:
             (
                 track.id
                 for track in (self.track, *self.others)
-                if track.id in known and track.box is not None and track.box.iou(box) >= SAME
+                if track.id in known and track.box is not None and track.box.iou(box) >= SAME_BOX
             ),
             None,
         )

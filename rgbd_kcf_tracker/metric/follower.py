@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE
+from rgbd_kcf_tracker.metric.perceive.figures import depth_step
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -562,7 +562,7 @@ def _as_deep(account: Account, whole: Silhouette, part: Silhouette) -> bool:
     rest = whole.mask & ~part.common(whole)
     ahead = account.scene.forward[whole.rows, whole.cols][rest]
     here = float(account.place(part)[1])
-    return abs(float(ahead.mean()) - here) < DEPTH_STEP + DEPTH_STEP_PER_METRE * here
+    return abs(float(ahead.mean()) - here) < depth_step(here)
 
 
 def _score(look: Look, stood: float) -> float:

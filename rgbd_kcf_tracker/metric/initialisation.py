@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
-from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, DEPTH_STEP_PER_METRE, UPRIGHT
+from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_step
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -167,7 +167,7 @@ def _pieces_in(scene: Scene, box: Box, least: float) -> Silhouette | None:
     labels = np.flatnonzero(whole)
     for label in labels[np.argsort(-shown[labels])[:MOST_DEPTHS]].tolist():
         z = float(surfaces.depth[label])
-        pieces = whole & (np.abs(surfaces.depth - z) < DEPTH_STEP + DEPTH_STEP_PER_METRE * z)
+        pieces = whole & (np.abs(surfaces.depth - z) < depth_step(z))
         if shown[pieces].sum() < enough:
             continue
         boxes = surfaces.boxes[pieces]
@@ -214,7 +214,7 @@ def _through_an_opening(scene: Scene, seen: Silhouette, box: Box) -> bool:
     top = min(max(math.ceil(b.y), 0), rows)
     band = np.s_[max(top - math.ceil(ABOVE * b.height), 0) : top, seen.cols]
     z = seen.depth
-    as_far = np.abs(scene.view.depth[band] - z) < DEPTH_STEP + DEPTH_STEP_PER_METRE * z
+    as_far = np.abs(scene.view.depth[band] - z) < depth_step(z)
     return bool(np.count_nonzero(as_far) > LIKEWISE * seen.mask.mean() * as_far.size > 0)
 
 

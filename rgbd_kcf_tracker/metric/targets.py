@@ -43,7 +43,8 @@ SAME_CAMERA = 0.02
 """Share by which the focal length of one camera may be told otherwise: more than calibrations of it
 differ by, and less than anybody's height is known to."""
 SAME_BOX = 0.5
-"""Overlap from which a box is about what is shown in another (PASCAL VOC)."""
+"""Overlap (intersection over union) with a target's box from which a box shows that target, as is
+common for matching boxes: of two of one size, each then holds two thirds of the other."""
 TURNS = 30.0
 """Times a second, of all targets together, that one followed by its look is searched for or learned
 from: each of a camera's 30 frames a second has time for one of them, whatever else it shows. One
@@ -275,7 +276,7 @@ class MetricTargets:
             # A guess would put the room and everybody elsewhere.
             frame = dataclasses.replace(frame, intrinsics=self._camera)
         if frame.depth is not None and self._metres is None:
-            self._metres = self._camera or Intrinsics.guess(*size)
+            self._metres, self._told_at = self._camera or Intrinsics.guess(*size), None
         scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
         self.account = None if scene is None else self._crowd.explain(scene, self._time)
         return dt

@@ -71,6 +71,11 @@ class Figure:
     parted: bool
 
 
+def depth_step(z: float) -> float:
+    """Metres in depth between two pieces of one person at most, who is ``z`` metres away."""
+    return DEPTH_STEP + DEPTH_STEP_PER_METRE * z
+
+
 def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
     """The figures of a scene.
 
@@ -127,7 +132,7 @@ def _joined(
         right, bottom, depth = left + width, top + height, float(ahead[label])
         area = float(areas[label])
         for index, (x0, y0, x1, y1, z, total) in enumerate(extents):
-            if abs(depth - z) > DEPTH_STEP + DEPTH_STEP_PER_METRE * z:
+            if abs(depth - z) > depth_step(z):
                 continue
             across, down = z / k.fx, z / k.fy
             beside = (max(left, x0) - min(right, x1)) * across
