@@ -72,6 +72,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
+from rgbd_kcf_tracker.metric.identity.relief import Relief
 from rgbd_kcf_tracker.metric.identity.stood import (
     CARRIED_OFF,
     CHOSEN_MOVING,
@@ -2792,3 +2793,20 @@ def test_a_look_is_found_where_it_was_learned_whatever_its_colours_count(
     )
     found = look.look(color, box.cx, box.cy, 1.0)
     assert (found.cx, found.cy) == pytest.approx((box.cx, box.cy), abs=0.5)  # a cell is 8 pixels
+
+
+def test_a_thing_stands_out_before_what_is_beside_it():
+    """By a table 0.3 m behind on its left, and what gives no reading on its right."""
+    depth = np.full((40, 60), 2.0, np.float32)
+    depth[:, 40:] = np.nan
+    table = Frame(np.zeros((40, 60, 3), np.uint8), depth.copy())
+    depth[10:30, 20:40] = 1.7
+    thing, box = dataclasses.replace(table, depth=depth), Box(20, 10, 20, 20)
+    known = Relief.of(thing, box)
+    assert known.sides == pytest.approx([0.3, np.nan], abs=1e-6, nan_ok=True)
+    assert known.left_in(known) is True
+    assert known.left_in(Relief.of(table, box)) is False
+    assert known.left_in(Relief.of(thing, Box(36, 10, 20, 20))) is None  # no reading in its middle
+    assert Relief.of(table, box).left_in(known) is None  # what never stood out
+    colour_alone = dataclasses.replace(thing, depth=None)
+    assert known.left_in(Relief.of(colour_alone, box)) is None

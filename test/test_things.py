@@ -57,6 +57,49 @@ def test_what_the_camera_turns_away_from_is_nothing_else(turns: Moments):
     assert total.wrong == 0
 
 
+def followed(seed: int, number: int, frames: range) -> bench.Tracked:
+    """What comes of a thing of a room that is chosen in the first of some frames."""
+    sequence = furnished(seed)
+    moments = [sequence[i] for i in frames]
+    truths = [moment.truths[number] for moment in moments]
+    assert truths[0].shown is not None
+    wheres = [bench.exact(truth) for truth in truths]
+    return bench.follow([moment.frame for moment in moments], wheres, truths[0].shown)
+
+
+def test_a_thing_is_looked_for_where_it_stands_in_the_world():
+    """The camera turned by more than its width in the first step: it was not seen for 29 frames."""
+    mug = followed(21, 1, range(47, 79))
+    assert (mug.right, mug.wrong, mug.missed) == (mug.frames, 0, 0)
+
+
+def test_a_thing_that_stands_on_a_table_is_nobody():
+    """A box at the image's side was the table as well, of a person's size and cut off there."""
+    box = followed(25, 7, range(14))
+    assert (box.right, box.wrong) == (box.frames, 0)
+
+
+@pytest.mark.parametrize('gone', [False, True])
+def test_a_thing_that_was_taken_away_is_not_where_it_stood(gone: bool):
+    """Though a table looks about as much like a mug there as the mug in a blurred picture."""
+    whole, bare = furnished(21), furnished(21)
+    bare.scene.actors = [
+        actor for number, actor in enumerate(bare.scene.actors, start=1) if number != 4
+    ]
+    bare.scene.people = range(len(bare.scene.actors))
+    moments = [whole[i] for i in range(0, 60)]
+    assert moments[0].truths[4].shown is not None
+    away = [i for i, m in enumerate(moments) if m.truths[4].visible_fraction == 0]
+    tracker, back = create_tracker('metric'), 0
+    tracker.start(moments[0].frame, moments[0].truths[4].shown)
+    for i, moment in enumerate(moments[1:], start=1):
+        taken = gone and i > away[2]
+        found = tracker.update(bare[i].frame if taken else moment.frame)
+        back += i > away[2] and found.box is not None
+    shown = sum(m.truths[4].visible_fraction > 0.5 for m in moments[away[2] :])
+    assert back == 0 if gone else back > 0.8 * shown > 10
+
+
 def chosen(moments: Sequence[SimulatedFrame], number: int) -> bench.Thing:
     truth = moments[0].truths[number]
     assert truth.shown is not None

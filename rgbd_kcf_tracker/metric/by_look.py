@@ -11,6 +11,7 @@ from depth where there is any on the target, else from a filter over scale.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -25,11 +26,12 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting, share_after
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
+from rgbd_kcf_tracker.metric.identity.relief import Relief
 from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import median_depth
 
 LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window, and from which other places are
@@ -77,9 +79,6 @@ the same at any resolution."""
 PEAKS = 2
 """Places in the image that are looked at besides where the target was lost. Each costs as much as
 a look at the target itself, and the cost is to be the same whatever the image shows."""
-DEPTH_SAMPLES = 24
-"""Readings along the shorter side of the middle of a box: some hundreds are enough for a median,
-and a target that fills the image costs no more."""
 SAME_DEPTH = 0.15
 """Share by which depth may change while the look is unsure. Who comes nearer at 1.5 m/s does so by
 that much in a tenth of a second at one metre; more of it is mostly somebody who passes before."""
@@ -89,9 +88,6 @@ brisk walk."""
 BORNE_OUT = 0.75
 """Share of ``hidden_ratio`` below which what is as near as the target was is not it, either: what
 is turned in a hand looks like itself again in less than a second."""
-MOST = 0.6
-"""Share of the pixels in the middle of a box that have a reading, from which these are taken to be
-the target's: where most have none, the target may be what reflects nothing, and they another's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +141,7 @@ class ByLook:
         self._scales.learn(frame.color, box.cx, box.cy, box.width, box.height, 1.0)
         self._first_depth = self._depth = depth_in(frame, box)
         self._elsewhere = Elsewhere()
+        self._relief = Relief.of(frame, box)
         self._small = _small(frame)
         self._elsewhere.keep(self._small, box.over(_step_of(frame)))
         self._flow = TextureFlow()
@@ -162,7 +159,9 @@ class ByLook:
         self._unlearned = 0.0
         self._put_off: Callable[[], None] | None = None
 
-    def step(self, frame: Frame, dt: float, turn: bool = True) -> Look | None:
+    def step(
+        self, frame: Frame, dt: float, turn: bool = True, expected: Box | None = None
+    ) -> Look | None:
         """Look for the target in the next frame, ``dt`` seconds later.
 
         Args:
@@ -170,6 +169,8 @@ class ByLook:
             dt: seconds.
             turn: whether it may be searched for in the image, and learned from. Without, it is
                 looked at where it is expected, and one that is hidden not at all.
+            expected: where it is in the image if it stands still in the world; None where that is
+                not known.
 
         Returns:
             Where it is, or None where it is hidden. :meth:`take` or :meth:`refuse` must follow
@@ -185,12 +186,16 @@ class ByLook:
         if self._backdrop is not None:
             self._backdrop.see(_averaged(frame), self.last_box.over(_step_of(frame)), dt)
         if self._hidden:
-            sighting = self._searched(frame, small, None)
-            self._hidden = sighting.ratio < parameters.seen_ratio
+            there = None if expected is None else self._there(frame, small, expected)
+            sighting = there or self._searched(frame, small, None)
+            self._hidden = there is None and sighting.ratio < parameters.seen_ratio
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
             sighting = self._look_at(frame, small, self._cx, self._cy)
+            if expected is not None and sighting.ratio < UNSURE:
+                there = self._look_at(frame, small, expected.cx, expected.cy)
+                sighting = max(sighting, there, key=lambda each: each.ratio)
             if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
@@ -216,6 +221,7 @@ class ByLook:
         believed = look.ratio > self._parameters.seen_ratio
         if believed and (look.depth is None or as_near(look.depth, self.last_depth)):
             self._sure = self._scale, self._depth
+            self._relief = Relief.of(frame, look.box)
         self.last_depth = look.depth
         self._put_off = partial(self._taken, frame, look, dt)
 
@@ -397,8 +403,27 @@ class ByLook:
         about: Mask = cv2.dilate(near.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
         return about
 
+    def _box_at(self, sighting: Sighting) -> Box:
+        return Box.from_center(sighting.cx, sighting.cy, *self._size)
+
     def _depth_of(self, frame: Frame, sighting: Sighting) -> float | None:
-        return depth_in(frame, Box.from_center(sighting.cx, sighting.cy, *self._size))
+        return depth_in(frame, self._box_at(sighting))
+
+    def _there(self, frame: Frame, small: Image, expected: Box) -> Sighting | None:
+        """What is where a hidden target stands, if depth bears out that it is still there.
+
+        It need not look as much like itself there as anywhere else.
+        """
+        found = self._look_at(frame, small, expected.cx, expected.cy)
+        enough = found.ratio >= self._parameters.hidden_ratio
+        return found if enough and self.still_there(frame, self._box_at(found)) else None
+
+    def still_there(self, frame: Frame, box: Box) -> bool | None:
+        """Whether a box shows something that stands out in depth as the target did.
+
+        None where depth does not tell.
+        """
+        return self._relief.left_in(Relief.of(frame, box))
 
     def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.
@@ -524,10 +549,5 @@ def as_near(depth: float | None, other: float | None) -> bool:
 
 def depth_in(frame: Frame, box: Box) -> float | None:
     """Median depth in the middle of a box in metres, None where most of it has no reading."""
-    if frame.depth is None:
-        return None
-    middle = frame.depth[part_in(frame.depth.shape, box.scaled(0.5))]
-    step = max(1, min(middle.shape) // DEPTH_SAMPLES)
-    depth = middle[::step, ::step]
-    valid = depth[is_reading(depth)]
-    return float(np.median(valid)) if valid.size > MOST * depth.size else None
+    depth = median_depth(frame, box.scaled(0.5))
+    return None if math.isnan(depth) else depth

@@ -27,6 +27,7 @@ from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, part_in
+from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 
@@ -50,6 +51,8 @@ next frame at 1 Hz, late ones as well; afterwards anybody may have come."""
 READ = 0.5
 """Share of a box's middle that has depth from which depth tells what is there: half, since what has
 no reading may be the target."""
+NEAREST = 0.2
+"""Metres before the camera from which a place is in the image: nothing is read nearer."""
 OUTLINED = 0.5
 """Overlap of a box with a figure's outline from which it is that figure, and not a part of it: from
 which a box counts as right (PASCAL VOC)."""
@@ -93,7 +96,9 @@ class GatedLook:
         self._agreed, self._unseen = 0, 0.0
         self._mobile = self._carried = False
         self._began: tuple[tuple[slice, slice], DepthArray] | None = None
-        self._about: frozenset[int] = frozenset()
+        self._people: frozenset[int] = frozenset()
+        self._last: Box | None = box
+        self._at: FloatArray | None = None
         self.stood: Stood | None = None
         self.drawn: Drawn | None = None
         if account is not None:
@@ -102,7 +107,10 @@ class GatedLook:
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             part = _part(account.scene, box)
             self._began = part, account.scene.view.depth[part].copy()
-            self._about = _people_about(account, box)
+            self._people = _people_about(account, box)
+            at = _place(account.scene.view, Look(box, 1.0, 0.0, look.last_depth))
+            if look.last_depth is not None and at is not None:
+                self.stood, self._at = Stood(*at), at[0]
 
     @property
     def lost_for(self) -> float:
@@ -112,7 +120,7 @@ class GatedLook:
     def others(self, account: Account) -> set[int]:
         """Numbers of those who were there before the target was chosen, or seen beside it."""
         before = {p.number for p in account.people if p.first_seen <= self._since}
-        return (before - self._about) | self._newcomers.beside
+        return (before - self._people) | self._newcomers.beside
 
     def step(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Gated:
         """Look for the target in the next ``frame``, ``dt`` seconds later.
@@ -128,13 +136,15 @@ class GatedLook:
             self._mobile |= self._has_gone(account)
             if self.stood is not None:
                 self.stood.carried(account.scene.way, dt)
-        look, stood = self._look.step(frame, dt, turn), 0.0
-        if look is not None and account is not None and self._refused(account, look):
+            self._last = self._carry(account.scene)
+        look, stood = self._look.step(frame, dt, turn, self._expected(account)), 0.0
+        if look is not None and account is not None and self._refused(frame, account, look):
             self._look.refuse(frame, look)
             look = None
         if look is not None:
             self._look.take(frame, look, dt)
             at = None if account is None else _place(account.scene.view, look)
+            self._at = None if at is None else at[0]
             if at is not None:
                 place, sigma, width = at
                 if self.stood is None:
@@ -156,29 +166,72 @@ class GatedLook:
             onto = self._onto(account, look, dt)
         return Gated(look, stood, onto)
 
-    def _refused(self, account: Account, look: Look) -> bool:
+    def _carry(self, scene: Scene) -> Box | None:
+        """Where the target was found last, as the image shows that place now."""
+        if isinstance(scene.way, Lost):
+            self._at = None
+        elif scene.way is not None and self._at is not None:
+            self._at = scene.way.of(self._at)
+        if self._at is None or not self._carried:
+            return self._look.last_box
+        return self._about(scene.view, self._at)
+
+    def _near_last(self, box: Box) -> bool:
+        return self._last is not None and box.intersection(self._last) > 0
+
+    def _expected(self, account: Account | None) -> Box | None:
+        """Where in the image the target is that has always stood still, if that is known."""
+        if account is None or self.stood is None or not self.stood.known:
+            return None
+        view = account.scene.view
+        box = self._about(view, self.stood.place)
+        shows = box is not None and box.over(view.step).clipped(*view.shape[::-1])
+        return box if shows else None
+
+    def _about(self, view: DepthView, place: FloatArray) -> Box | None:
+        """The target's box about a place, ``(3,)`` metres; None beside the camera or behind it."""
+        x, y, z = place.tolist()
+        if z < NEAREST:
+            return None
+        across, down = view.place(x, y, z)
+        last = self._look.last_box
+        return Box.from_center(across * view.step, down * view.step, last.width, last.height)
+
+    def _refused(self, frame: Frame, account: Account, look: Look) -> bool:
         """Whether depth says that what is found is not the target."""
         # Where depth does not show it either, a look that has become unlike is something else;
         # but depth says nothing of what has no reading.
         silent = look.depth is None and self._look.last_depth is None
         unlike = look.ratio < self._seen_ratio and not silent
         unlike = unlike and not self._goes_on(account, look)
+        unlike = unlike and not self._stands_there(account, look)
+        still = self.stood is not None and self.stood.known
+        if still and self._look.still_there(frame, look.box) is False:
+            return True
         reasons = (self._stands, self._taken, self._far, self._stood_elsewhere, self._unlike)
         return unlike or any(refused(account, look) for refused in reasons)
 
     def _goes_on(self, account: Account, look: Look) -> bool:
         """Whether depth shows something as near as the target was a frame ago, before the room."""
         near = self._unseen == 0 and as_near(look.depth, self._look.last_depth)
-        if not near or look.box.intersection(self._look.last_box) == 0:
+        if not near or not self._near_last(look.box):
             return False
         before = account.scene.before[_part(account.scene, look.box)]
         stands = np.count_nonzero(before) >= (1 - IS_ROOM) * before.size > 0
         return bool(stands or not account.settled)
 
+    def _stands_there(self, account: Account, look: Look) -> bool:
+        """Whether what is found is where the target stood in the world, as near as it stood."""
+        expected = self._expected(account)
+        if expected is None or look.depth is None or look.box.intersection(expected) == 0:
+            return False
+        at = _place(account.scene.view, look)
+        return self.stood is not None and at is not None and self.stood.log_odds(*at[:2]) > 0
+
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
         at = _place(account.scene.view, look)
-        followed = self._unseen == 0 and look.box.intersection(self._look.last_box) > 0
+        followed = self._unseen == 0 and self._near_last(look.box)
         if self.stood is None or followed or at is None:
             return False
         return self.stood.log_odds(*at[:2]) < ELSEWHERE
@@ -220,7 +273,7 @@ class GatedLook:
         if account.owner[index] < 0:
             return False
         owner = account.people[account.owner[index]]
-        before = owner.first_seen <= self._since and owner.number not in self._about
+        before = owner.first_seen <= self._since and owner.number not in self._people
         return before or (drawn is not None and owner.number in self._newcomers.beside)
 
     def _far(self, account: Account, look: Look) -> bool:
@@ -230,7 +283,7 @@ class GatedLook:
         is put down it stands before the room.
         """
         box = look.box
-        if self._carried or not account.settled or box.intersection(self._look.last_box) > 0:
+        if self._carried or not account.settled or self._near_last(box):
             return False
         part = _part(account.scene, box)
         depth = account.scene.view.depth[part]

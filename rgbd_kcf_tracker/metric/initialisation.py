@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target: from
@@ -356,7 +356,9 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
             yield seen
     for label in np.flatnonzero(_overlaps_of(scene, box) > MEANT_IOU).tolist():
         seen = scene.silhouette(label)
-        if seen.cut.any and person_sized(seen, account.look(seen).top):
+        top = account.look(seen).top
+        low = top is not None and top < TOP[0] and not seen.cut.top
+        if seen.cut.any and not low and person_sized(seen, top):
             yield seen
 
 

@@ -92,6 +92,11 @@ class Stood:
         """
         return self._carried and self._known and self._vague < SURELY
 
+    @property
+    def place(self) -> FloatArray:
+        """Where it stands, ``(3,)`` metres in the camera's frame of now."""
+        return self._place
+
     def log_odds(self, place: FloatArray, sigma: FloatArray) -> float:
         """What a place says for its being the target, 0 where that is not known.
 

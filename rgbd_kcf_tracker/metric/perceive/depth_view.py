@@ -16,6 +16,13 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 DepthArray = npt.NDArray[np.float32]
 
+SAMPLES = 24
+"""Readings along the shorter side of a part of the image: some hundreds are enough for a median,
+and a target that fills the image costs no more."""
+MOST = 0.6
+"""Share of the pixels in the middle of a box that have a reading, from which these are taken to be
+the target's: where most have none, the target may be what reflects nothing, and they another's."""
+
 
 def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
     """Rows and columns of all pixels that a box touches, as far as they are in an image."""
@@ -24,6 +31,17 @@ def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
         slice(math.floor(min(max(box.y, 0), rows)), math.ceil(min(max(box.bottom, 0), rows))),
         slice(math.floor(min(max(box.x, 0), cols)), math.ceil(min(max(box.right, 0), cols))),
     )
+
+
+def median_depth(frame: Frame, box: Box) -> float:
+    """Median depth in a box of a frame in metres, nan where most of it has no reading."""
+    if frame.depth is None:
+        return math.nan
+    part = frame.depth[part_in(frame.depth.shape, box)]
+    step = max(1, min(part.shape) // SAMPLES)
+    depth = part[::step, ::step]
+    valid = depth[is_reading(depth)]
+    return float(np.median(valid)) if valid.size > MOST * depth.size else math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
