@@ -186,16 +186,18 @@ class ByLook:
         if self._backdrop is not None:
             self._backdrop.see(_averaged(frame), self.last_box.over(_step_of(frame)), dt)
         if self._hidden:
-            there = None if expected is None else self._there(frame, small, expected)
-            sighting = there or self._searched(frame, small, None)
-            self._hidden = there is None and sighting.ratio < parameters.seen_ratio
+            stands = None if expected is None else self._there(frame, small, expected)
+            sighting = stands or self._searched(frame, small, None)
+            self._hidden = stands is None and sighting.ratio < parameters.seen_ratio
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
-            sighting = self._look_at(frame, small, self._cx, self._cy)
-            if expected is not None and sighting.ratio < UNSURE:
-                there = self._look_at(frame, small, expected.cx, expected.cy)
-                sighting = max(sighting, there, key=lambda each: each.ratio)
+            at = self._cx, self._cy
+            there = at if expected is None else (expected.cx, expected.cy)
+            sighting = self._look_at(frame, small, *there)
+            if there != at and sighting.ratio < UNSURE:  # or it has begun to move
+                moved = self._look_at(frame, small, *at)
+                sighting = max(sighting, moved, key=lambda each: each.ratio)
             if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, small, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):

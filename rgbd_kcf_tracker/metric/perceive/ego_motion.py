@@ -280,7 +280,7 @@ def _told(
     first, second = (points.astype(np.float64) for points in corners)
     if stands(last, gray, first, second):
         return None
-    motion = _agreed(first, second, last_view, np.zeros(3))
+    motion = _agreed(first, second, last_view)
     if motion is not None:  # or what moved is somebody, or too little of it is known yet
         return motion if _bears_out(motion, first, second, last_view) else None
     stood = int(np.count_nonzero(_stood(first, second)))
@@ -291,11 +291,7 @@ def _told(
     first, second = first[leads], second[leads]
     if len(first) < LEAST_CORNERS:
         return lost
-    right, down = np.median(second - first, axis=0).tolist()
-    if math.hypot(right, down) <= FAR:
-        return lost
-    k = last_view.intrinsics
-    motion = _agreed(first, second, last_view, np.array([-down / k.fy, right / k.fx, 0.0]))
+    motion = _agreed(first, second, last_view)
     return lost if motion is None else motion
 
 
@@ -309,7 +305,7 @@ def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
     first, second = anchor.corners[good].astype(np.float64), found[good].astype(np.float64)
     if len(first) < LEAST_CORNERS or not _have_moved(_lengths(second - first) > CREEPS, first):
         return None
-    motion = _agreed(first, second, anchor.view, np.zeros(3))
+    motion = _agreed(first, second, anchor.view)
     if motion is None or not _bears_out(motion, first, second, anchor.view):
         return None
     return motion
@@ -376,22 +372,31 @@ def _projected(points: FloatArray, k: Intrinsics) -> FloatArray:
     return np.stack((x * k.fx / z + k.cx, y * k.fy / z + k.cy), axis=1)
 
 
-def _agreed(
-    first: FloatArray, second: FloatArray, view: DepthView, turn: FloatArray
-) -> Pose | None:
-    """The motion that enough corners agree on, None where they do not.
+def _agreed(first: FloatArray, second: FloatArray, view: DepthView) -> Pose | None:
+    """The motion that most corners agree on, None where they are not enough.
+
+    It is fitted from standing still, and where they have gone far also from the turn that most of
+    them tell: from either a fit may end where only some agree.
 
     Args:
         first: ``(n, 2)`` the corners in the picture before.
         second: ``(n, 2)`` where they are now.
         view: the depth before.
-        turn: ``(3,)`` radians about each axis from which the motion is fitted.
     """
-    points = _points(first, view)
-    motion = _fitted(points, second, view.intrinsics, turn)
-    off = _lengths(_projected(motion.of(points), view.intrinsics) - second)
-    agreeing = np.count_nonzero(off < AGREE)
-    return motion if agreeing >= max(LEAST_CORNERS, LEAST_AGREEING * len(points)) else None
+    points, k = _points(first, view), view.intrinsics
+    starts = [np.zeros(3)]
+    right, down = np.median(second - first, axis=0).tolist()
+    if math.hypot(right, down) > FAR:
+        starts.append(np.array([-down / k.fy, right / k.fx, 0.0]))
+    least, most = max(LEAST_CORNERS, LEAST_AGREEING * len(points)), 0
+    best: Pose | None = None
+    for start in starts:
+        motion = _fitted(points, second, k, start)
+        off = _lengths(_projected(motion.of(points), k) - second)
+        agreeing = int(np.count_nonzero(off < AGREE))
+        if agreeing >= least and agreeing > most:
+            best, most = motion, agreeing
+    return best
 
 
 def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray) -> Pose:
