@@ -19,6 +19,9 @@ from rgbd_kcf_tracker.bench import things as bench
 from rgbd_kcf_tracker.bench.things_room import furnished
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.metric.perceive.colors import view_image
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.simulation.sequence import SimulatedFrame, SimulatedSequence
 
@@ -98,6 +101,25 @@ def test_a_thing_that_was_taken_away_is_not_where_it_stood(gone: bool):
         back += i > away[2] and found.box is not None
     shown = sum(m.truths[4].visible_fraction > 0.5 for m in moments[away[2] :])
     assert back == 0 if gone else back > 0.8 * shown > 10
+
+
+def test_before_a_far_wall_the_camera_turns_and_does_not_step_aside():
+    """What corners it has are a wall's, of which a step of 0.37 m showed as much as the turn."""
+    sequence, ego, poses = furnished(24), EgoMotion(), []
+    motion: Pose | Lost | None = None
+    near: np.ndarray | None = None
+    for i in (70, 71):
+        frame = sequence[i].frame
+        view = DepthView.of(frame, 240)
+        assert view is not None
+        near = (view.depth > 0) & (view.depth < 3.0) if near is None else near
+        image = view_image(frame.color, view.step, view.shape)
+        motion = ego.update(image, view, near, 1 / sequence.rate_hz)
+        poses.append(Pose(*sequence.camera_pose(i)))
+    assert isinstance(motion, Pose)
+    ahead = np.array([0.0, 0.0, 2.0])
+    true = poses[0].after(poses[1].inverse).of(ahead)
+    assert motion.of(ahead) == pytest.approx(true, abs=0.07)
 
 
 def chosen(moments: Sequence[SimulatedFrame], number: int) -> bench.Thing:

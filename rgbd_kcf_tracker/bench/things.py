@@ -255,11 +255,12 @@ def _motion(first: Frame, then: Frame) -> Pose | None:
     if first.pose is not None and then.pose is not None:
         return first.pose.after(then.pose.inverse)
     told, motion = EgoMotion(), None
+    seconds = abs(then.stamp_ns - first.stamp_ns) * 1e-9
     for frame in (first, then):
         view = DepthView.of(frame, VIEW)
         assert view is not None
         image = view_image(frame.color, view.step, view.shape)
-        motion = told.update(image, view, np.zeros(view.shape, np.bool_), 0.0)
+        motion = told.update(image, view, np.zeros(view.shape, np.bool_), seconds)
     return None if isinstance(motion, Lost) else motion or Pose(np.eye(3), np.zeros(3))
 
 

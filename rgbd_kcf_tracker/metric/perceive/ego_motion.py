@@ -59,6 +59,9 @@ so that those on somebody who walks come to count little; four more at that sett
 FAR = 4.0
 """Pixels of the view by which corners move before a camera that turns fast: from standing still the
 fit of :data:`ITERATIONS` hardly finds that, as it begins with this scale."""
+PACE, SHORTEST = 1.0, 0.03
+"""Metres a second at which a camera is mostly carried or driven at the most, of which its step is
+taken to be a deviation; and seconds that it has for that at the least, whatever the stamps say."""
 STILL, LEAST_STILL = 0.3, 0.35
 """Pixels of flow up to which a corner stands still, and their share of the view from which the
 camera does: somebody may have stepped before the others."""
@@ -148,7 +151,7 @@ class EgoMotion:
         if last is None or last_view is None or last.shape != gray.shape:
             self._anchor = None
             return None
-        motion = _told(last, last_view, gray, others) if changed(last, gray) else None
+        motion = _told(last, last_view, gray, others, seconds) if changed(last, gray) else None
         self._since_crept += seconds
         self._unasked += seconds
         if motion is not None:
@@ -272,7 +275,11 @@ def upper_median(values: GrayImage) -> int:
 
 
 def _told(
-    last: GrayImage, last_view: DepthView, gray: GrayImage, others: npt.NDArray[np.bool_]
+    last: GrayImage,
+    last_view: DepthView,
+    gray: GrayImage,
+    others: npt.NDArray[np.bool_],
+    seconds: float,
 ) -> Pose | Lost | None:
     corners = corners_between(last, gray, _usable(last_view, others))
     if corners is None or len(corners[0]) < LEAST_CORNERS:
@@ -280,7 +287,7 @@ def _told(
     first, second = (points.astype(np.float64) for points in corners)
     if stands(last, gray, first, second):
         return None
-    motion = _agreed(first, second, last_view)
+    motion = _agreed(first, second, last_view, seconds)
     if motion is not None:  # or what moved is somebody, or too little of it is known yet
         return motion if _bears_out(motion, first, second, last_view) else None
     stood = int(np.count_nonzero(_stood(first, second)))
@@ -291,8 +298,10 @@ def _told(
     first, second = first[leads], second[leads]
     if len(first) < LEAST_CORNERS:
         return lost
-    motion = _agreed(first, second, last_view)
-    return lost if motion is None else motion
+    motion = _agreed(first, second, last_view, seconds)
+    if motion is None:
+        return lost
+    return motion if _bears_out(motion, first, second, last_view) else None
 
 
 def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
@@ -305,7 +314,7 @@ def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
     first, second = anchor.corners[good].astype(np.float64), found[good].astype(np.float64)
     if len(first) < LEAST_CORNERS or not _have_moved(_lengths(second - first) > CREEPS, first):
         return None
-    motion = _agreed(first, second, anchor.view)
+    motion = _agreed(first, second, anchor.view, anchor.age)
     if motion is None or not _bears_out(motion, first, second, anchor.view):
         return None
     return motion
@@ -372,7 +381,7 @@ def _projected(points: FloatArray, k: Intrinsics) -> FloatArray:
     return np.stack((x * k.fx / z + k.cx, y * k.fy / z + k.cy), axis=1)
 
 
-def _agreed(first: FloatArray, second: FloatArray, view: DepthView) -> Pose | None:
+def _agreed(first: FloatArray, second: FloatArray, view: DepthView, seconds: float) -> Pose | None:
     """The motion that most corners agree on, None where they are not enough.
 
     It is fitted from standing still, and where they have gone far also from the turn that most of
@@ -382,6 +391,7 @@ def _agreed(first: FloatArray, second: FloatArray, view: DepthView) -> Pose | No
         first: ``(n, 2)`` the corners in the picture before.
         second: ``(n, 2)`` where they are now.
         view: the depth before.
+        seconds: between the two.
     """
     points, k = _points(first, view), view.intrinsics
     starts = [np.zeros(3)]
@@ -391,7 +401,7 @@ def _agreed(first: FloatArray, second: FloatArray, view: DepthView) -> Pose | No
     least, most = max(LEAST_CORNERS, LEAST_AGREEING * len(points)), 0
     best: Pose | None = None
     for start in starts:
-        motion = _fitted(points, second, k, start)
+        motion = _fitted(points, second, k, start, seconds)
         off = _lengths(_projected(motion.of(points), k) - second)
         agreeing = int(np.count_nonzero(off < AGREE))
         if agreeing >= least and agreeing > most:
@@ -399,10 +409,15 @@ def _agreed(first: FloatArray, second: FloatArray, view: DepthView) -> Pose | No
     return best
 
 
-def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray) -> Pose:
-    """The motion that projects points ``(n, 3)`` to pixels ``(n, 2)``, from a first turn on."""
+def _fitted(
+    points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatArray, seconds: float
+) -> Pose:
+    """The motion that projects points ``(n, 3)`` to pixels ``(n, 2)``, from a first turn on.
+
+    Before a wall alone a step aside is as good as a turn: it is the likelier the smaller it is.
+    """
     rotation, shift = cv2.Rodrigues(start)[0], np.zeros(3)
-    scale = FAR
+    scale, prior = FAR, np.zeros(6)
     for _ in range(ITERATIONS):
         x, y, z = rotation @ points.T + shift[:, None]
         near = 1 / np.maximum(z, NEAREST)
@@ -416,7 +431,9 @@ def _fitted(points: FloatArray, pixels: FloatArray, k: Intrinsics, start: FloatA
         weights = np.concatenate((weight, weight))
         residual = np.concatenate((across, down))
         weighted = (jacobian * weights[:, None]).T
-        step = np.linalg.solve(weighted @ jacobian + 1e-6 * np.eye(6), -weighted @ residual)
+        prior[3:] = (scale / (PACE * max(seconds, SHORTEST))) ** 2
+        pull = weighted @ residual + prior * np.concatenate((np.zeros(3), shift))
+        step = np.linalg.solve(weighted @ jacobian + np.diag(prior + 1e-6), -pull)
         turn, _ = cv2.Rodrigues(step[:3])
         rotation = turn @ rotation
         shift = turn @ shift + step[3:]
