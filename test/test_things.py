@@ -122,6 +122,24 @@ def test_before_a_far_wall_the_camera_turns_and_does_not_step_aside():
     assert motion.of(ahead) == pytest.approx(true, abs=0.07)
 
 
+def test_a_camera_that_turns_is_noticed_though_no_frame_differs_much_from_the_last():
+    """At 30 Hz it was after 0.3 s, and what stood still had moved for good by then."""
+    sequence, ego, told = furnished(42, rate_hz=30.0), EgoMotion(), []
+    for i in range(47, 53):
+        frame = sequence[i].frame
+        view = DepthView.of(frame, 240)
+        assert view is not None
+        image = view_image(frame.color, view.step, view.shape)
+        told.append(ego.update(image, view, np.zeros(view.shape, np.bool_), 1 / 30))
+        ego.settle()
+    first = next(i for i, motion in enumerate(told) if motion is not None)
+    assert first < 5
+    assert all(isinstance(motion, Pose) for motion in told[first:])
+    true = Pose(*sequence.camera_pose(47)).after(Pose(*sequence.camera_pose(47 + first)).inverse)
+    ahead = np.array([0.0, 0.0, 2.0])
+    assert told[first].of(ahead) == pytest.approx(true.of(ahead), abs=0.05)
+
+
 def chosen(moments: Sequence[SimulatedFrame], number: int) -> bench.Thing:
     truth = moments[0].truths[number]
     assert truth.shown is not None

@@ -72,6 +72,9 @@ CREPT, FORGOTTEN = 0.3, 0.6
 """Seconds after which it is asked whether a camera that seems to stand has crept, and seconds for
 which the picture is kept with which that is told: a robot that drives through a hall at the pace of
 a walk moves what is ahead by a part of a pixel a frame, and in half a second by some."""
+ASKED = 0.08
+"""Seconds after which it is asked at once where the picture has changed: at 30 Hz a camera that
+turns by half a radian a second hardly changes it from one frame to the next."""
 FAST = 0.045
 """Seconds between frames below which that is asked after the answer, and told a frame later."""
 STANDS = 3.0
@@ -162,7 +165,7 @@ class EgoMotion:
             self._unasked = seconds
         self._anchor.age += seconds
         stood = self._since_crept > STANDS
-        if stood and self._unasked < CREPT:
+        if stood and self._unasked < CREPT and not self._turns(gray, others):
             return None
         if stood and seconds < FAST:
             self._asks = True
@@ -172,6 +175,12 @@ class EgoMotion:
         if crept is not None:
             self._anchor, self._since_crept = None, 0.0
         return crept
+
+    def _turns(self, gray: GrayImage, others: npt.NDArray[np.bool_]) -> bool:
+        """Whether a camera seems to have moved since it stood, though from no frame to the next."""
+        if self._anchor is None or self._unasked < ASKED:
+            return False
+        return changed(self._anchor.gray, gray, ~(self._anchor.others | others))
 
     def settle(self) -> None:
         """Ask whether a camera that stood creeps, so that the next :meth:`update` tells how far.
