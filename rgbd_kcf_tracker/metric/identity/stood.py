@@ -21,9 +21,10 @@ OFF, OFF_SHARE = 0.05, 0.3
 """Metres, and shares of its width, by which what is seen of a thing that stands still is elsewhere:
 another side, a part (of places all over its width the deviation is 0.29 of that). A quarter of a
 metre whatever its size made the wall beside a mug the mug."""
-DRIFT = 0.1
+DRIFT = 0.05
 """Metres by which the camera's own motion is off after each radian of turning and metre of way; on
-``redkitchen`` it is off by 0.02 to 0.06 after 1.5 radians, at 5 to 30 frames a second."""
+``redkitchen`` it is off by 0.02 to 0.06 after 1.5 radians, at 5 to 30 frames a second. At 0.1 what
+stood a third of a metre beside a thing was the thing once the camera had looked aside."""
 STEADY = 1.0
 """Seconds in which a place is taken on from what is seen there: at 10 Hz a tenth of what one view
 is off by."""
