@@ -18,7 +18,7 @@ from rgbd_kcf_tracker import Frame, Tracker, create_tracker
 from rgbd_kcf_tracker.bench import things as bench
 from rgbd_kcf_tracker.bench.things_room import furnished
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
@@ -76,6 +76,28 @@ def test_a_thing_is_looked_for_where_it_stands_in_the_world():
     assert (mug.right, mug.wrong, mug.missed) == (mug.frames, 0, 0)
 
 
+@pytest.mark.parametrize('number', [1, 4])
+def test_a_thing_is_kept_when_the_image_size_changes(number: int):
+    """Where it was last was asked for in the pixels of before: it was hidden, for good."""
+    sequence = furnished(21, SIZE)
+    start = next(m for m in sequence if m.truths[number].visible_fraction > 0.95)
+    frame, shown = start.frame, start.truths[number].shown
+    assert shown is not None
+    assert frame.depth is not None
+    assert frame.intrinsics is not None
+    k = frame.intrinsics
+    color, depth = (each.repeat(2, 0).repeat(2, 1) for each in (frame.color, frame.depth))
+    larger = Frame(color, depth, 0, Intrinsics(2 * k.fx, 2 * k.fy, 2 * k.cx, 2 * k.cy))
+    tracker = create_tracker('metric')
+    tracker.start(frame, shown)
+    for i in range(1, 8):
+        now = frame if i < 4 else larger
+        found = tracker.update(dataclasses.replace(now, stamp_ns=frame.stamp_ns + i * 100_000_000))
+        times = 1 if i < 4 else 2
+        assert found.box is not None
+        assert found.box.iou(shown.stretched(times, times)) > 0.7
+
+
 def test_a_thing_that_stands_on_a_table_is_nobody():
     """A box at the image's side was the table as well, of a person's size and cut off there."""
     box = followed(25, 7, range(14))
@@ -90,7 +112,7 @@ def test_a_thing_that_was_taken_away_is_not_where_it_stood(gone: bool):
         actor for number, actor in enumerate(bare.scene.actors, start=1) if number != 4
     ]
     bare.scene.people = range(len(bare.scene.actors))
-    moments = [whole[i] for i in range(0, 60)]
+    moments = [whole[i] for i in range(60)]
     assert moments[0].truths[4].shown is not None
     away = [i for i, m in enumerate(moments) if m.truths[4].visible_fraction == 0]
     tracker, back = create_tracker('metric'), 0
@@ -103,41 +125,48 @@ def test_a_thing_that_was_taken_away_is_not_where_it_stood(gone: bool):
     assert back == 0 if gone else back > 0.8 * shown > 10
 
 
-def test_before_a_far_wall_the_camera_turns_and_does_not_step_aside():
-    """What corners it has are a wall's, of which a step of 0.37 m showed as much as the turn."""
-    sequence, ego, poses = furnished(24), EgoMotion(), []
-    motion: Pose | Lost | None = None
+AHEAD = np.array([0.0, 0.0, 2.0])
+
+
+def motions(sequence: SimulatedSequence, frames: range, beyond: float) -> list[Pose | Lost | None]:
+    """What is told of the camera's motion in some frames by what is so many metres away."""
+    ego, told = EgoMotion(), []
     near: np.ndarray | None = None
-    for i in (70, 71):
+    for i in frames:
         frame = sequence[i].frame
         view = DepthView.of(frame, 240)
         assert view is not None
-        near = (view.depth > 0) & (view.depth < 3.0) if near is None else near
+        near = (view.depth > 0) & (view.depth < beyond) if near is None else near
         image = view_image(frame.color, view.step, view.shape)
-        motion = ego.update(image, view, near, 1 / sequence.rate_hz)
-        poses.append(Pose(*sequence.camera_pose(i)))
+        told.append(ego.update(image, view, near, 1 / sequence.rate_hz))
+        ego.settle()
+    return told
+
+
+def true_motion(sequence: SimulatedSequence, first: int, then: int) -> Pose:
+    poses = (Pose(*sequence.camera_pose(i)) for i in (first, then))
+    return next(poses).after(next(poses).inverse)
+
+
+def test_before_a_far_wall_the_camera_turns_and_does_not_step_aside():
+    """What corners it has are a wall's, of which a step of 0.37 m showed as much as the turn."""
+    sequence = furnished(24)
+    _, motion = motions(sequence, range(70, 72), 3.0)
     assert isinstance(motion, Pose)
-    ahead = np.array([0.0, 0.0, 2.0])
-    true = poses[0].after(poses[1].inverse).of(ahead)
-    assert motion.of(ahead) == pytest.approx(true, abs=0.07)
+    assert motion.of(AHEAD) == pytest.approx(true_motion(sequence, 70, 71).of(AHEAD), abs=0.07)
 
 
 def test_a_camera_that_turns_is_noticed_though_no_frame_differs_much_from_the_last():
     """At 30 Hz it was after 0.3 s, and what stood still had moved for good by then."""
-    sequence, ego, told = furnished(42, rate_hz=30.0), EgoMotion(), []
-    for i in range(47, 53):
-        frame = sequence[i].frame
-        view = DepthView.of(frame, 240)
-        assert view is not None
-        image = view_image(frame.color, view.step, view.shape)
-        told.append(ego.update(image, view, np.zeros(view.shape, np.bool_), 1 / 30))
-        ego.settle()
+    sequence = furnished(42, rate_hz=30.0)
+    told = motions(sequence, range(47, 53), 0.0)
     first = next(i for i, motion in enumerate(told) if motion is not None)
     assert first < 5
+    since = told[first]
+    assert isinstance(since, Pose)
     assert all(isinstance(motion, Pose) for motion in told[first:])
-    true = Pose(*sequence.camera_pose(47)).after(Pose(*sequence.camera_pose(47 + first)).inverse)
-    ahead = np.array([0.0, 0.0, 2.0])
-    assert told[first].of(ahead) == pytest.approx(true.of(ahead), abs=0.05)
+    true = true_motion(sequence, 47, 47 + first)
+    assert since.of(AHEAD) == pytest.approx(true.of(AHEAD), abs=0.05)
 
 
 def chosen(moments: Sequence[SimulatedFrame], number: int) -> bench.Thing:

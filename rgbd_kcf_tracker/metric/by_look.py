@@ -383,8 +383,7 @@ class ByLook:
         """Look about a place; what stood there while the target was elsewhere is not seen."""
         possible = self._possible(frame, cx, cy)
         sighting = self._appearance.look(frame.color, cx, cy, self._scale, possible)
-        box = Box.from_center(sighting.cx, sighting.cy, *self._size)
-        if self._elsewhere.unchanged(small, box.over(_step_of(frame))):
+        if self._elsewhere.unchanged(small, self._box_at(sighting).over(_step_of(frame))):
             return dataclasses.replace(sighting, peak=0.0, ratio=0.0)
         return sighting
 

@@ -136,8 +136,9 @@ class GatedLook:
             self._mobile |= self._has_gone(account)
             if self.stood is not None:
                 self.stood.carried(account.scene.way, dt)
-            self._last = self._carry(account.scene)
         look, stood = self._look.step(frame, dt, turn, self._expected(account)), 0.0
+        if account is not None:  # in the pixels of now, which the step above has gone over to
+            self._last = self._carry(account.scene)
         if look is not None and account is not None and self._refused(frame, account, look):
             self._look.refuse(frame, look)
             look = None
@@ -203,8 +204,7 @@ class GatedLook:
         # but depth says nothing of what has no reading.
         silent = look.depth is None and self._look.last_depth is None
         unlike = look.ratio < self._seen_ratio and not silent
-        unlike = unlike and not self._goes_on(account, look)
-        unlike = unlike and not self._stands_there(account, look)
+        unlike = unlike and not (self._goes_on(account, look) or self._stands_there(account, look))
         still = self.stood is not None and self.stood.known
         if still and self._look.still_there(frame, look.box) is False:
             return True

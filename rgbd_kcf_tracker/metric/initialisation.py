@@ -357,7 +357,7 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
     for label in np.flatnonzero(_overlaps_of(scene, box) > MEANT_IOU).tolist():
         seen = scene.silhouette(label)
         top = account.look(seen).top
-        low = top is not None and top < TOP[0] and not seen.cut.top
+        low = top is not None and top < TOP[0]
         if seen.cut.any and not low and person_sized(seen, top):
             yield seen
 

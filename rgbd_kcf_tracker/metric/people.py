@@ -32,7 +32,7 @@ ASPECT = 1.15
 """Height against width, at the least."""
 FILL = (0.3, 0.8)
 """Share of the box that a body fills; a box or a cupboard fills more, a rack less."""
-RELIEF, RELIEF_PER_SQUARE_METRE = 0.01, 0.001
+OFF_PLANE, OFF_PLANE_PER_SQUARE_METRE = 0.01, 0.001
 """Metres by which a body's surface lies off a plane, in the median of its pixels: twice what a
 pushed box shows, and beyond the noise of a structured-light camera, of which two thirds of a
 deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
@@ -100,4 +100,4 @@ def rounded(view: DepthView, seen: Silhouette) -> bool:
         )
         off = np.abs(1 - z * (pixels @ plane)) * z
         fitted = off <= OUTLIER * np.median(off)
-    return bool(np.median(off) > RELIEF + RELIEF_PER_SQUARE_METRE * seen.depth**2)
+    return bool(np.median(off) > OFF_PLANE + OFF_PLANE_PER_SQUARE_METRE * seen.depth**2)

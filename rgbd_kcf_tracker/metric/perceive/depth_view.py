@@ -20,8 +20,8 @@ SAMPLES = 24
 """Readings along the shorter side of a part of the image: some hundreds are enough for a median,
 and a target that fills the image costs no more."""
 MOST = 0.6
-"""Share of the pixels in the middle of a box that have a reading, from which these are taken to be
-the target's: where most have none, the target may be what reflects nothing, and they another's."""
+"""Share of the pixels of a part of the image that have a reading, from which these are taken to be
+of what it shows: where most have none, that may reflect nothing, and they be another's."""
 
 
 def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
