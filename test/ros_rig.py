@@ -231,6 +231,14 @@ class Rig:
         topics = (self.color, self.depth, self.info, self.init, self.init_point)
         self.wait(lambda: all(p.get_subscription_count() for p in topics), 60.0, 'the tracker')
         if tracker is not None:
+            # Both ways: what is sent before the tracker sees its publisher too is for nobody.
+            sent = {p.topic_name for p in topics}
+            listeners = [s for s in tracker.subscriptions if s.topic_name in sent]
+            self.wait(
+                lambda: all(s.get_publisher_count() for s in listeners),
+                60.0,
+                'its sight of the camera',
+            )
             outputs, heard = tracker._outputs, ('box', 'occluded', 'roi', 'position')
             self.wait(lambda: all(map(outputs.wanted, heard)), 60.0, 'its answers')
             return
