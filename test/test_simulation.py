@@ -259,6 +259,13 @@ def test_every_scenario_renders_with_truth_that_agrees(name: str) -> None:
     assert sequence.truth(1) == truths[1]
 
 
+@pytest.mark.parametrize('seed', [92, 146])
+def test_what_a_tall_person_carries_is_in_view(seed: int) -> None:
+    """Not above a low camera's picture, where there would be nothing to follow."""
+    scene = simulate('carried_mug', seed=seed, rate_hz=2, size=SMALL)
+    assert scene[0].visible_fraction > 0.5
+
+
 @pytest.mark.parametrize('name', HIDING)
 @pytest.mark.parametrize('seed', [7])
 def test_occlusion_scenarios_hide_the_target_and_show_it_again(name: str, seed: int) -> None:

@@ -229,16 +229,24 @@ def carried_mug(stage: Stage) -> World:
     person = stage.person()
     side = stage.sign()
     z = stage.uniform(1.5, 2.0)
-    points: list[Point] = [(stage.x(side * s, z + stage.uniform(-0.2, 0.2)), z)
-                           for s in (-0.45, 0.4, 0.45, -0.4)]  # fmt: skip
-    way = route(points, stage.uniform(0.5, 0.8))
+    apart = [stage.uniform(-0.2, 0.2) for _ in range(4)]
+    speed = stage.uniform(0.5, 0.8)
+    reach: dict[str, Keys] = {'reach': [(0, 1.0)]}
+    hand = person.hand(Motion([(0, 0, 0)], channels=reach).stance(0))
+    rim, ahead = 0.08 - float(hand[1]), 0.1 - float(hand[2])
+    while not stage.below_upper_edge(rim, z - ahead):
+        z += 0.1  # somebody tall before a low camera, or one that looks down
+    points: list[Point] = [
+        (stage.x(side * s, z + d), z) for s, d in zip((-0.45, 0.4, 0.45, -0.4), apart, strict=True)
+    ]
+    way = route(points, speed)
     heading: Keys = [(0.0, 0.5), (2.0, -0.4), (4.0, 0.6), (6.0, 0.0)]
-    actor = stage.walk(person, way, heading, {'reach': [(0, 1.0)]})
+    actor = stage.walk(person, way, heading, reach)
 
     def place(t: float) -> Vector:
         stance = actor.motion.stance(t)
-        ahead = np.array([math.sin(stance.heading), 0.0, -math.cos(stance.heading)])
-        held: Vector = person.hand(stance) + ahead * 0.1 + np.array([0, 0.02, 0])
+        forward = np.array([math.sin(stance.heading), 0.0, -math.cos(stance.heading)])
+        held: Vector = person.hand(stance) + forward * 0.1 + np.array([0, 0.02, 0])
         return held
 
     cup = mug(stage.rng, place, lambda t: 2.2 + actor.motion.value('heading', t))

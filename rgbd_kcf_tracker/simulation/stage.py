@@ -83,6 +83,7 @@ class Stage:
     def __init__(self, rng: np.random.Generator, camera: Intrinsics, size: tuple[int, int]) -> None:
         self.rng = rng
         self.half_tan = size[0] / 2 / camera.fx
+        self._half_tan_up = size[1] / 2 / camera.fy
         self.depth = float(rng.uniform(5.0, 7.5))
         self.half_width = float(rng.uniform(0.62, 0.95) * self.depth)
         self.camera_height = self.pitch = 0.0
@@ -105,6 +106,11 @@ class Stage:
     def x(self, share: float, z: float) -> float:
         """Metres to the right at distance ``z`` of a share of the half picture (1: its border)."""
         return share * z * self.half_tan
+
+    def below_upper_edge(self, height: float, z: float) -> bool:
+        """Whether the picture shows what is so high above the floor, ``z`` metres ahead."""
+        up = math.atan((height - self.camera_height) / z)
+        return up < math.atan(self._half_tan_up) - self.pitch
 
     def person(self, like: Wardrobe | None = None, child: bool = False) -> Person:
         """Somebody new, whose clothes differ clearly from the cast's unless given."""
