@@ -536,6 +536,45 @@ def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():
     assert sum(overlap < 0.6 for overlap in overlaps[2:]) <= 1, overlaps
 
 
+def overlaps_in(name: str, seed: int, who: int, first: int, end: int) -> list[float | None]:
+    """Of the target's box with what shows of it, frame by frame; None where either is none."""
+    size = (640, 480) if name == 'following' else (320, 240)
+    sequence, tracker, overlaps = simulate(name, seed=seed, rate_hz=10, size=size), None, []
+    for i in range(first, end):
+        sample = sequence[i]
+        visible = sample.truths[who].visible
+        if tracker is None:
+            tracker = create_tracker('metric')
+            assert visible is not None
+            track = tracker.start(sample.frame, visible)
+        else:
+            track = tracker.update(sample.frame)
+        seen = visible is not None and track.box is not None
+        overlaps.append(track.box.iou(visible) if seen else None)
+    return overlaps
+
+
+def test_furniture_that_a_target_walks_past_is_not_the_target_before_a_camera_that_turns():
+    """A cupboard 0.3 m behind him, known before he hid it, had his box when he had gone on."""
+    overlaps = overlaps_in('lookaround', 52, 2, 26, 39)
+    assert all(overlap is not None and overlap > 0.6 for overlap in overlaps), overlaps
+
+
+def test_who_touches_a_chair_before_him_is_told_from_it_by_depth():
+    """They are one surface at the start, of which the chair was the target from then on."""
+    overlaps = overlaps_in('lookaround', 53, 3, 0, 6)
+    assert overlaps[0] == 1.0
+    assert all(overlap is not None and overlap > 0.4 for overlap in overlaps), overlaps
+    assert overlaps[5] > 0.6
+
+
+def test_who_passes_a_target_at_the_end_of_depth_is_not_the_target():
+    """Depth shows him, and only the look the target: he was the target at 0.99 from then on."""
+    overlaps = overlaps_in('following', 53, 5, 0, 14)
+    good = [overlap is not None and overlap > 0.5 for overlap in overlaps]
+    assert sum(good) >= 13, overlaps
+
+
 def test_real_people_at_5_hz(shared_data: Path):
     folder = shared_data / 'rgbd' / 'filinha'
     frames = frames_of(folder, 5.0, XTION, depth=True)

@@ -87,6 +87,23 @@ def test_where_somebody_stood_from_the_first_frame_the_room_goes_on():
     assert not room.before.any()
 
 
+@pytest.mark.parametrize(('gap', 'known'), [(0.5, True), (3.0, False)])
+def test_of_what_is_close_behind_somebody_it_stays_known_where_it_is(gap: float, known: bool):
+    """Nothing else tells a cupboard from him who walks past it half a metre before it."""
+    room = known_room(wall())
+    here = with_thing(WALL - gap)
+    see(room, here, 0.1, None)
+    chosen = NOBODY.copy()
+    chosen[THING] = True
+    room.open(chosen, here)
+    see(room, here, 0.1, chosen)
+    assert room.before[THING].all()
+    assert (room.depth[THING] > 0).all() == known
+    assert room.vacant[THING].any() == known, 'what shows there when nobody does'
+    see(room, wall(), 0.1, chosen)
+    assert not room.before.any()
+
+
 def test_what_is_put_down_becomes_the_room_after_a_while_unless_it_is_somebody():
     for somebody in (False, True):
         room = known_room(wall())

@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
-from rgbd_kcf_tracker.metric.drawn import unlike
+from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import fits, surface_of
+from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import depth_step
@@ -239,6 +239,8 @@ class Follower:
             surface.drift(dt)
             return self._glance(frame, None, view, dt, surface)
         found = surface.step(account, frame, dt)
+        if found is not None and self._passes(account, found):
+            found = None
         if surface.was_away:
             self._withdraw()
             if found is not None and self.person is not None:
@@ -267,6 +269,18 @@ class Follower:
         if self._look is not None and not found.seen.cut.any and score >= LEARNED:
             self._look.attend(frame, box, dt, ATTEND)
         return self._tracked(frame, box, score, found.seen.depth, surface.belief())
+
+    def _passes(self, account: Account, found: Candidate) -> bool:
+        """Whether what depth shows looks unlike the target, beside where only its look was found.
+
+        Of a target at the end of what depth sees it shows nothing, but of who passes it does.
+        """
+        last = self.track.box
+        if self._unread_for == 0 or last is None or self.person is None:
+            return False
+        if box_about(account.scene, found.seen).iou(last) >= LOCK_IOU:
+            return False
+        return self.person.gallery.log_odds(account.look(found.seen)) < UNLIKE
 
     def _returned(
         self,

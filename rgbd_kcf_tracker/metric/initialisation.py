@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_step
-from rgbd_kcf_tracker.metric.perceive.parting import BROAD
+from rgbd_kcf_tracker.metric.perceive.parting import BEHIND, BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
@@ -36,8 +36,8 @@ in a hand became the person, at 0.5 a face the body below it (docs/experiments.m
 PART_IOU, INSIDE = 0.35, 0.9
 """The same of a figure of which so much lies in the box: limbs or a side of it are missing."""
 LEAST_FILL = 0.5
-"""Share of the given box that a surface fills of which the box shows only a part: the greater part
-of it, or the box is about something else."""
+"""Share of what is read in the given box that is a surface's of which the box shows only a part:
+most of it, or the box is about something else."""
 SCATTERED, THICK = 0.06, 0.4
 """Share of the given box that the scattered readings of a target fill, at the least; and metres
 between the target's readings, arms and a far reading's noise included."""
@@ -94,9 +94,8 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     if piece is not None and _found_again(account, piece, parameters):
         return piece
     behind = behind or _scattered(scene, told)
-    if behind is None and piece is not None and _one_of_two(scene, piece, told):
-        return piece
-    return behind or _meant(account, box)
+    apart = piece is not None and (_one_of_two(scene, piece, told) or _apart_in_depth(scene, piece))
+    return behind or (piece if apart else _meant(account, box))
 
 
 def whole_of(account: Account, box: Box) -> Silhouette | None:
@@ -225,7 +224,8 @@ def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
     shown[0] = 0
     label = int(np.argmax(shown))
     large = scene.surfaces.pixels[label] > MOST_SHARE * total
-    if large or shown[label] < max(1.0, LEAST_FILL * total):
+    read = np.count_nonzero(scene.view.depth[part_in(scene.view.shape, box.over(scene.view.step))])
+    if large or shown[label] < max(1.0, LEAST_FILL * read):
         return None
     part = _within(scene, scene.silhouette(label), box)
     return part if box_about(scene, part).iou(box) >= LOCK_IOU else None
@@ -246,6 +246,19 @@ def _one_of_two(scene: Scene, piece: Silhouette, box: Box) -> bool:
     farther = scene.view.depth[part] > piece.depth + DEPTH_STEP
     farther &= (labels > 0) & ~larger_than_anybody(scene.sizes)[labels] & ~own[part]
     return bool(np.count_nonzero(farther) < SOMEBODY_FARTHER * farther.size)
+
+
+def _apart_in_depth(scene: Scene, piece: Silhouette) -> bool:
+    """Whether the rest of its surface is too far from a piece that is larger than a head.
+
+    So is a chair from somebody behind it who touches it.
+    """
+    if piece.width * piece.height < HEAD:
+        return False
+    own = piece.in_view(scene.view.shape)
+    rest = (scene.surfaces.labels == scene.surfaces.labels[own][0]) & ~own
+    ahead = scene.forward
+    return rest.any() and abs(float(ahead[rest].mean()) - float(ahead[own].mean())) > BEHIND
 
 
 def _found_again(account: Account, piece: Silhouette, parameters: MetricParameters) -> bool:
@@ -309,7 +322,11 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     # Behind the target the same gap may show more.
     nearest = int(layers[np.argmax(readings > 0.5 * readings.max())])
     mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
-    if np.count_nonzero(mine) < SCATTERED * mine.size:
+    # Of what fills most of the box the rim is scattered, too.
+    filled = np.bincount(labels.ravel(), minlength=len(scene.surfaces))
+    filled[larger_than_anybody(scene.sizes)] = 0
+    filled[0] = 0
+    if np.count_nonzero(mine) < max(SCATTERED * mine.size, LEAST_BESIDE * filled.max()):
         return None
     # Where the middle of the box shows something nearer, they are of what is behind the target.
     nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)

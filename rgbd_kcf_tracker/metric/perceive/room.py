@@ -57,6 +57,9 @@ still be he: half of someone with arms half spread. Who touches a desk is not th
 LEAP, LEAP_PER_SECOND = 0.2, 1.5
 """Metres by which the depth of a person goes up from one frame to the next at the most; where it
 goes up by more he has gone, and what shows is the room behind him."""
+CLOSE = 1.0
+"""Metres behind a person up to which the room stays known: he may walk up to it in a second, and
+when it shows again only that tells it from him."""
 BEHIND = 0.4
 """Metres behind a person from which what shows in his place, and goes on as the room, is the room:
 he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
@@ -196,12 +199,17 @@ class Room:
         self._time = 0.0
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
-        """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody."""
+        """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody.
+
+        What is known to be close behind them stays so: when it shows again, only that tells it from
+        them. Of what is farther the leap in depth does, and says where it is by then.
+        """
+        self.before |= somebody & (depth > 0)
+        self.vacant &= ~somebody
+        somebody = somebody & ~(self._nearer(depth) & (self.depth < depth + np.float32(CLOSE)))
         self.depth[somebody] = 0
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
-        self.before |= somebody & (depth > 0)
-        self.vacant &= ~somebody
 
     def close(self, part: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, into the room: they turned out to be part of it."""
