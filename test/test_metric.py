@@ -536,9 +536,10 @@ def test_the_box_of_one_of_two_who_touch_does_not_grow_over_both():
     assert sum(overlap < 0.6 for overlap in overlaps[2:]) <= 1, overlaps
 
 
-def overlaps_in(name: str, seed: int, who: int, first: int, end: int) -> list[float | None]:
+def overlaps_in(
+    name: str, seed: int, who: int, first: int, end: int, size: tuple[int, int] = (320, 240)
+) -> list[float | None]:
     """Of the target's box with what shows of it, frame by frame; None where either is none."""
-    size = (640, 480) if name == 'following' else (320, 240)
     sequence, tracker, overlaps = simulate(name, seed=seed, rate_hz=10, size=size), None, []
     for i in range(first, end):
         sample = sequence[i]
@@ -570,9 +571,22 @@ def test_who_touches_a_chair_before_him_is_told_from_it_by_depth():
 
 def test_who_passes_a_target_at_the_end_of_depth_is_not_the_target():
     """Depth shows him, and only the look the target: he was the target at 0.99 from then on."""
-    overlaps = overlaps_in('following', 53, 5, 0, 14)
+    overlaps = overlaps_in('following', 53, 5, 0, 14, (640, 480))
     good = [overlap is not None and overlap > 0.5 for overlap in overlaps]
     assert sum(good) >= 13, overlaps
+
+
+def test_who_is_chosen_half_hidden_by_one_he_touches_is_known_by_a_view_of_him_alone():
+    """The first view was mostly of the other, and he was unlike it in full view."""
+    overlaps = overlaps_in('lookaround', 56, 4, 2, 14, (640, 480))
+    assert all(overlap is not None and overlap > 0.5 for overlap in overlaps), overlaps
+
+
+def test_who_was_one_surface_with_a_wall_is_known_when_he_comes_back():
+    """Chosen at the image's side, out of it after three frames, and back after two seconds."""
+    overlaps = overlaps_in('lookaround', 57, 3, 24, 64)
+    assert overlaps[3:25] == [None] * 22
+    assert all(overlap is not None and overlap > 0.8 for overlap in overlaps[34:]), overlaps
 
 
 def test_real_people_at_5_hz(shared_data: Path):

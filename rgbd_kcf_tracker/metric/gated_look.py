@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, p
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.upright import TOP
 
 LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
 """Metres, and shares of its width, by which the middle of a box found by look is off the target's:
@@ -102,7 +103,7 @@ class GatedLook:
         self.stood: Stood | None = None
         self.drawn: Drawn | None = None
         if account is not None:
-            if look.unread:
+            if look.unread or _tall(account.scene, box, look):
                 self.drawn = Drawn.of(account.scene, box, look, account.time)
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             part = _part(account.scene, box)
@@ -321,6 +322,15 @@ class GatedLook:
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
     return part_in(scene.view.shape, box.scaled(MIDDLE).over(scene.view.step))
+
+
+def _tall(scene: Scene, box: Box, look: ByLook) -> bool:
+    """Whether what a box shows is as tall as somebody, who touches what stands beside him."""
+    if look.last_depth is None:
+        return False
+    k = scene.view.intrinsics
+    tall = box.height / scene.view.step * look.last_depth / k.fy
+    return TOP[0] < tall < TOP[1]
 
 
 def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:

@@ -55,6 +55,9 @@ thick, so that no two stand as near."""
 STRIP = 0.15
 """Metres of a figure beside the part of it that was chosen from which that is somebody else, where
 it is taller than any limb: boxes are not drawn as narrow."""
+PARTING = 2.0
+"""Seconds after which what was learned of somebody who was chosen as one of two who touch counts,
+mixed as it is, if no view of him alone has taken its place: better than nothing."""
 MOST_PEOPLE = 48
 """People who are remembered beside the chosen ones; who was seen longest ago is forgotten. It
 bounds time and memory, and is more than come by in most rooms."""
@@ -141,6 +144,7 @@ class Crowd:
         if index >= 0:
             account.owner[index] = len(account.people) - 1
         self._see(account, len(account.people) - 1, seen, index)
+        person.gallery.mixed = bool(rest)
         self._welcome_beside(account, person, rest)
         return person
 
@@ -205,6 +209,8 @@ class Crowd:
             for person in self.people:
                 person.carried(scene.motion, self._axes, scene.axes)
         self._axes = scene.axes
+        for person in self.people:
+            person.gallery.mixed &= time - person.first_seen < PARTING
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, look_of(scene, f.seen, f.top)) for f in figures]

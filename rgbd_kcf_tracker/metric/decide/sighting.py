@@ -9,7 +9,7 @@ import math
 
 from rgbd_kcf_tracker.metric.decide.account import Account
 from rgbd_kcf_tracker.metric.identity.calm import Calm
-from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES
+from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Gallery
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -81,13 +81,15 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
         or (account.settled and person_sized(seen, view.top) and _came(scene, seen))
         or upright(seen, scene.view.intrinsics, view.top)
     )
-    if view.top is not None and view.top > 1.2:
-        person.gallery.learn_height(view.top, account.time)
     alone = index < 0 or not account.sights[index].figure.parted
     headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
     # Where something nearer cuts somebody off, some of his pixels may be another's.
     apart = not (all_sides and (seen.cut.left or seen.cut.right))
     whole = seen.area > WHOLE and headed and alone and apart
+    if whole and person.gallery.mixed:
+        person.gallery = Gallery()
+    if view.top is not None and view.top > 1.2:
+        person.gallery.learn_height(view.top, account.time)
     if whole or not person.gallery.views:
         person.gallery.learn(view, account.time)
 

@@ -312,9 +312,12 @@ class Gallery:
         views: the first and the newest.
         looks: the same stacked, None while there is none.
         top: median height of the head above the floor in metres, None where it is not known.
+        mixed: whether the only view is of a piece cut out of two who touched, so that it shows
+            something of either: it tells nothing, until a view of one alone takes its place.
     """
 
     def __init__(self) -> None:
+        self.mixed = False
         self.views: list[View] = []
         self.looks: Looks | None = None
         self.top: float | None = None
@@ -351,7 +354,7 @@ class Gallery:
 
     def _log_odds(self, view: View, alike: float | None, views: int) -> float:
         odds = height_log_odds(view.top, self.top)
-        if alike is None:
+        if alike is None or self.mixed:
             return odds
         return odds + look_log_odds(alike, min(view.total, self._largest), views, view.grey)
 
@@ -385,6 +388,7 @@ class Gallery:
     def copy(self) -> Gallery:
         """The same views and heights; what either learns from now on is its own."""
         same = Gallery()
+        same.mixed = self.mixed
         same._set_views(list(self.views), list(self._learned))
         same._set_tops(list(self._tops))
         return same
