@@ -19,7 +19,9 @@ from people_rig import BLACK, CAMERA, COLS, DARK_RED, RED, ROWS, WALL, Someone, 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, depth_in
+from rgbd_kcf_tracker.metric.drawn import UNLIKE
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.simulation import SimulatedFrame, simulate
 from rgbd_kcf_tracker.track import Track
 
@@ -587,6 +589,24 @@ def test_who_was_one_surface_with_a_wall_is_known_when_he_comes_back():
     overlaps = overlaps_in('lookaround', 57, 3, 24, 64)
     assert overlaps[3:25] == [None] * 22
     assert all(overlap is not None and overlap > 0.8 for overlap in overlaps[34:]), overlaps
+
+
+@pytest.mark.parametrize(
+    ('name', 'seed', 'first', 'who'), [('following', 62, 0, 4), ('lookaround', 57, 24, 3)]
+)
+def test_a_poor_view_of_who_was_drawn_speaks_against_nobody(
+    name: str, seed: int, first: int, who: int
+):
+    """Drawn 43 pixels tall beyond depth's reach, and as one with the wall that he stands before."""
+    sample = simulate(name, seed=seed, rate_hz=10, size=(640, 480))[first]
+    box = sample.truths[who].visible
+    assert box is not None
+    targets = MetricTargets(MetricParameters())
+    drawn = targets._followers[targets.add(sample.frame, box)]._gated.drawn
+    other = targets.account.sights[0].view
+    assert drawn.gallery.log_odds(other) < UNLIKE
+    assert not drawn.unlike(other)
+    assert dataclasses.replace(drawn, whole=True, telling=True).unlike(other)
 
 
 def test_real_people_at_5_hz(shared_data: Path):

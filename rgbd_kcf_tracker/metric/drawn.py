@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Somebody of whom depth shows nothing, known by the box that was drawn about him."""
+"""Somebody whom depth does not show, or not apart, known by the box that was drawn about him."""
 
 from __future__ import annotations
 
@@ -26,6 +26,9 @@ OWN = 0.5
 ABOUT, TOUCHED = 1.1, 0.05
 """Size of a box with a rim in which others may touch who is in it, and the share of it from which
 somebody before him is read there."""
+FEW = 100
+"""Pixels of the view of a box below which what it shows is mostly rim, mixed with what is behind:
+five by twenty, of which half are not."""
 UNLIKE = -1.0
 """Log-odds below which what a look has found, where depth does not tell, is something else: so are
 nine of ten boxes on walls and doors beyond depth's reach, and hardly any on people
@@ -74,18 +77,21 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawn:
-    """Who a box is drawn about where depth shows nothing.
+    """Who a box is drawn about where depth shows nothing, or nobody apart from what is there.
 
     Attributes:
         gallery: how he looks.
         place: ``(2,)`` metres across and along the floor, were he of mean height.
         whole: whether the box ends where he does, and not where depth's view does or another
             stands before him.
+        telling: whether others can be told from him: what depth shows at his place is not he, and
+            he shows large enough.
     """
 
     gallery: Gallery
     place: FloatArray
     whole: bool
+    telling: bool
 
     @classmethod
     def of(cls, scene: Scene, box: Box, look: ByLook, time: float) -> Drawn | None:
@@ -100,11 +106,13 @@ class Drawn:
         # What stands before him is read, and hides a part of him.
         about = scene.before[part_in(view.shape, b.scaled(ABOUT))]
         alone = np.count_nonzero(about) < TOUCHED * about.size
-        return cls(gallery, scene.axes @ np.array(middle), bool(alone) and not scene.ends(box).any)
+        whole = bool(alone) and not scene.ends(box).any
+        telling = look.unread and b.area >= FEW
+        return cls(gallery, scene.axes @ np.array(middle), whole, telling)
 
     def unlike(self, view: View) -> bool:
-        """Whether a figure does not look as he does: said only if all of him was drawn."""
-        return self.whole and self.gallery.log_odds(view) < UNLIKE
+        """Whether a figure does not look as he does: said if all of him was drawn, and large."""
+        return self.whole and self.telling and self.gallery.log_odds(view) < UNLIKE
 
 
 def unlike(

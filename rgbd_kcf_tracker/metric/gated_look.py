@@ -86,7 +86,7 @@ class GatedLook:
 
     Attributes:
         stood: where the target stands; None where that is not known.
-        drawn: who it is, where it is somebody of whom depth shows nothing; else None.
+        drawn: who it is, where it is somebody whom depth does not show, or not apart; else None.
     """
 
     def __init__(
@@ -257,7 +257,7 @@ class GatedLook:
 
     def _unlike(self, account: Account, look: Look) -> bool:
         """Whether what has no reading looks unlike who was drawn: it is what he stood before."""
-        if self.drawn is None or look.depth is not None:
+        if self.drawn is None or not self.drawn.telling or look.depth is not None:
             return False
         return unlike(self.drawn.gallery, account.scene, look.box, self._look)
 
