@@ -591,6 +591,13 @@ def test_who_was_one_surface_with_a_wall_is_known_when_he_comes_back():
     assert all(overlap is not None and overlap > 0.8 for overlap in overlaps[34:]), overlaps
 
 
+def test_of_two_who_part_after_the_first_frame_it_is_the_one_in_the_box():
+    """Who steps out from before him had the number, and the target was somebody new."""
+    overlaps = overlaps_in('following', 63, 3, 107, 109, (640, 480))
+    assert overlaps[1] is not None
+    assert overlaps[1] > 0.8
+
+
 @pytest.mark.parametrize(
     ('name', 'seed', 'first', 'who'), [('following', 62, 0, 4), ('lookaround', 57, 24, 3)]
 )

@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
+from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import depth_step
@@ -63,6 +63,9 @@ MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or
 somebody who touches it."""
+SOON = 0.25
+"""Seconds after which nobody is where a box was drawn about him: at a walk (1.4 m/s) he is half a
+body farther."""
 TALL, TALLER = 0.9, 1.2
 """Metres of height of an upright part of somebody, half of him seen past a corner, and of somebody:
 no chair's back reaches as high as the latter."""
@@ -111,7 +114,7 @@ class Follower:
         self._account: Account | None = None
         self._hidden_for = self._unread_for = 0.0
         self._partial = False
-        self._since = crowd.time
+        self._since, self._drawn = crowd.time, box
         self._elsewhere = Elsewhere()
         self._comeback: Comeback | None = None
         self.person: Person | None = None
@@ -254,7 +257,7 @@ class Follower:
             return self._hidden(frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
-        whole = self._whole(account, found.seen)
+        whole = self._whole(account, found.seen) or self._as_drawn(account, found.seen)
         if whole is not None:
             self._start_over(account, whole)
             box = outline_box(account.scene, whole)
@@ -390,6 +393,21 @@ class Follower:
         if owner >= 0 and account.people[owner] is not self.person:
             return None
         return figure.seen if _as_deep(account, figure.seen, seen) else None
+
+    def _as_drawn(self, account: Account, seen: Silhouette) -> Silhouette | None:
+        """Who is where a box was drawn a moment ago, if what was taken for the target is not.
+
+        Two who were one figure then, of whom one was meant, are two now.
+        """
+        if account.time - self._since > SOON:
+            return None
+        scene = account.scene
+        if box_about(scene, seen).iou(self._drawn) >= LOCK_IOU:
+            return None
+        for sight, owner in zip(account.sights, account.owner, strict=True):
+            if owner < 0 and box_about(scene, sight.figure.seen).iou(self._drawn) > SAME_OUTLINE:
+                return sight.figure.seen
+        return None
 
     def _start_over(self, account: Account, whole: Silhouette) -> None:
         assert self.person is not None

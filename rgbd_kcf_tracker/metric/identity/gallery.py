@@ -313,7 +313,7 @@ class Gallery:
         looks: the same stacked, None while there is none.
         top: median height of the head above the floor in metres, None where it is not known.
         mixed: whether the only view is of a piece cut out of two who touched, so that it shows
-            something of either: it tells nothing, until a view of one alone takes its place.
+            something of either: it speaks against nobody until a view of one alone takes its place.
     """
 
     def __init__(self) -> None:
@@ -354,9 +354,10 @@ class Gallery:
 
     def _log_odds(self, view: View, alike: float | None, views: int) -> float:
         odds = height_log_odds(view.top, self.top)
-        if alike is None or self.mixed:
+        if alike is None:
             return odds
-        return odds + look_log_odds(alike, min(view.total, self._largest), views, view.grey)
+        look = look_log_odds(alike, min(view.total, self._largest), views, view.grey)
+        return odds + (max(look, 0.0) if self.mixed else look)
 
     def learn_height(self, top: float, time: float) -> None:
         """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""
