@@ -114,7 +114,7 @@ class Follower:
         self._account: Account | None = None
         self._hidden_for = self._unread_for = 0.0
         self._partial = False
-        self._since, self._drawn = crowd.time, box
+        self._since = crowd.time
         self._elsewhere = Elsewhere()
         self._comeback: Comeback | None = None
         self.person: Person | None = None
@@ -124,6 +124,7 @@ class Follower:
         self.response: float | None = None
         if account is not None:
             box = self._lock(frame, account, box)
+        self._drawn = box
         self._look: ByLook | None = None
         self._gated: GatedLook | None = None
         if parameters.use_look or self._surface is None:
