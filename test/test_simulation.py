@@ -266,6 +266,12 @@ def test_what_a_tall_person_carries_is_in_view(seed: int) -> None:
     assert scene[0].visible_fraction > 0.5
 
 
+@pytest.mark.timeout(20)
+def test_a_picture_too_low_to_show_what_is_carried_is_made_all_the_same() -> None:
+    """He went on for ever in search of a place where a camera that looks down would show it."""
+    assert simulate('carried_mug', seed=6, rate_hz=2, size=(640, 100))[0].visible_fraction < 0.5
+
+
 @pytest.mark.parametrize('name', HIDING)
 @pytest.mark.parametrize('seed', [7])
 def test_occlusion_scenarios_hide_the_target_and_show_it_again(name: str, seed: int) -> None:

@@ -155,13 +155,11 @@ def _pieces_in(scene: Scene, box: Box, least: float) -> Silhouette | None:
         box: the box.
         least: how well they must fit it, see :func:`_fit`.
     """
-    surfaces, sizes = scene.surfaces, scene.sizes
+    surfaces = scene.surfaces
     shown = _shown(scene, box)
     whole = (shown > OWN * surfaces.pixels) & (shown >= NOISE)
     whole[0] = False
-    small = ~larger_than_anybody(sizes)
-    small[0] = False
-    enough = max(SCATTERED * shown.sum(), LEAST_BESIDE * shown[small].max(initial=0))
+    enough = max(SCATTERED * shown.sum(), LEAST_BESIDE * _largest_shown(scene, shown))
     best = None
     labels = np.flatnonzero(whole)
     for label in labels[np.argsort(-shown[labels])[:MOST_DEPTHS]].tolist():
@@ -286,6 +284,13 @@ def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
     return np.bincount(labels.ravel(), minlength=len(scene.surfaces))
 
 
+def _largest_shown(scene: Scene, shown: npt.NDArray[np.intp]) -> int:
+    """How many pixels a box shows of what it shows most of, and what is no larger than a person."""
+    small = ~larger_than_anybody(scene.sizes)
+    small[0] = False
+    return int(shown[small].max(initial=0))
+
+
 def _figure_of(account: Account, box: Box) -> Silhouette | None:
     """The figure that a box is drawn about, of which limbs may be missing."""
     figures = [sight.figure.seen for sight in account.sights]
@@ -323,10 +328,8 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     nearest = int(layers[np.argmax(readings > 0.5 * readings.max())])
     mine &= np.abs(depth - (nearest + 0.5) * THICK) < THICK
     # Of what fills most of the box the rim is scattered, too.
-    filled = np.bincount(labels.ravel(), minlength=len(scene.surfaces))
-    filled[larger_than_anybody(scene.sizes)] = 0
-    filled[0] = 0
-    if np.count_nonzero(mine) < max(SCATTERED * mine.size, LEAST_BESIDE * filled.max()):
+    most = _largest_shown(scene, _shown(scene, box))
+    if np.count_nonzero(mine) < max(SCATTERED * mine.size, LEAST_BESIDE * most):
         return None
     # Where the middle of the box shows something nearer, they are of what is behind the target.
     nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)

@@ -234,8 +234,8 @@ def carried_mug(stage: Stage) -> World:
     reach: dict[str, Keys] = {'reach': [(0, 1.0)]}
     hand = person.hand(Motion([(0, 0, 0)], channels=reach).stance(0))
     rim, ahead = 0.08 - float(hand[1]), 0.1 - float(hand[2])
-    while not stage.below_upper_edge(rim, z - ahead):
-        z += 0.1  # somebody tall before a low camera, or one that looks down
+    # Somebody tall stands farther from a low camera, or one that looks down, but in the room.
+    z = max(z, min(ahead + stage.shown_from(rim), stage.depth - 1.0))
     points: list[Point] = [
         (stage.x(side * s, z + d), z) for s, d in zip((-0.45, 0.4, 0.45, -0.4), apart, strict=True)
     ]

@@ -107,10 +107,10 @@ class Stage:
         """Metres to the right at distance ``z`` of a share of the half picture (1: its border)."""
         return share * z * self.half_tan
 
-    def below_upper_edge(self, height: float, z: float) -> bool:
-        """Whether the picture shows what is so high above the floor, ``z`` metres ahead."""
-        up = math.atan((height - self.camera_height) / z)
-        return up < math.atan(self._half_tan_up) - self.pitch
+    def shown_from(self, height: float) -> float:
+        """Metres ahead from which the picture shows what is so high above the floor, if any."""
+        edge = math.atan(self._half_tan_up) - self.pitch
+        return (height - self.camera_height) / math.tan(edge) if edge > 0 else math.inf
 
     def person(self, like: Wardrobe | None = None, child: bool = False) -> Person:
         """Somebody new, whose clothes differ clearly from the cast's unless given."""
