@@ -607,6 +607,23 @@ def test_an_uncompressed_bag_gives_every_whole_message(tmp_path: Path) -> None:
                 assert found == sum(e <= length for e in ends)
 
 
+def test_text_that_no_reader_of_ros2_takes_is_not_copied(tmp_path: Path) -> None:
+    """ROS 1 lets a frame be named by any bytes; rclpy raises where they are no UTF-8."""
+    path = write_ros1(tmp_path / 'a.bag', camera_messages(make_frames(3)))
+    data = path.read_bytes()
+    at = data.index(b'optical')
+    path.write_bytes(data[:at] + b'\xd3' + data[at + 1 :])
+    bag = RawBag(path)
+    count, warnings = copy_bag(bag, tmp_path / 'b.mcap')
+    total = sum(len(t) for t in bag.topics.values())
+    bag.close()
+    assert count == total - 1
+    assert sum('is left out' in w for w in warnings) == 1
+    written = RawBag(tmp_path / 'b.mcap')
+    assert sum(written.message(t, i) is not None for t, i in written.in_order()) == count
+    written.close()
+
+
 def test_a_cut_off_database_gives_what_is_whole(tmp_path: Path) -> None:
     path = WRITERS['db3'](tmp_path, many_messages())
     data = path.read_bytes()

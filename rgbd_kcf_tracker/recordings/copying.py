@@ -93,7 +93,8 @@ def copy_bag(
 ) -> tuple[int, list[str]]:
     """Copy all messages of a bag into an mcap file, in the order of recording.
 
-    Messages of ROS 2 are copied byte by byte; those of ROS 1 are put into ROS 2's serialisation.
+    Messages of ROS 2 are copied byte by byte; those of ROS 1 are put into ROS 2's serialisation,
+    and left out where that cannot be read.
 
     Returns:
         The number of messages copied, and warnings about those that could not be.
@@ -123,7 +124,7 @@ def copy_bag(
                 continue
             kind, definition = found
             try:
-                data = translate.data(topic.type, bag.read(topic, index))
+                data = translate.checked(topic.type, bag.read(topic, index))
             except RecordingError as error:
                 warnings.append(f'message {index} of {topic.name} is left out: {error}')
                 continue
@@ -145,5 +146,5 @@ class _Passer:
             return kind, Definition('ros2msg', definition_text(kind))
         return None
 
-    def data(self, kind: str, data: bytes) -> bytes | memoryview:
+    def checked(self, kind: str, data: bytes) -> bytes | memoryview:
         return data

@@ -65,6 +65,21 @@ class Ros1Translator:
         except Exception as error:  # a hostile message makes the library raise anything
             raise RecordingError(f'it is no {kind}: {error or type(error).__name__}') from None
 
+    def checked(self, kind: str, data: bytes) -> bytes | memoryview:
+        """The same, where a reader of ROS 2 takes it: text goes over as it is, also if no UTF-8.
+
+        Raises:
+            RecordingError: where it is damaged, or no reader would take it.
+        """
+        translated = self.data(kind, data)
+        found = self._found[kind]
+        assert found is not None
+        try:
+            self._to.deserialize_cdr(translated, found[0])
+        except Exception as error:  # as above
+            raise RecordingError(f'it is no {found[0]}: {error or type(error).__name__}') from None
+        return translated
+
     def _prepare(self, kind: str) -> tuple[str, Definition, Convert]:
         target = _RENAMED.get(kind, kind)
         if target not in self._to.types:
