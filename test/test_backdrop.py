@@ -290,3 +290,14 @@ def test_arms_and_legs_and_who_comes_near_are_boxed_without_depth(scene, least):
 def test_what_shows_of_whom_a_thing_hides_is_boxed_without_depth(scene, least):
     """Most of such frames were hidden: a filter of the whole does not know a half of somebody."""
     assert right_without_depth(scene, seed=73) > least
+
+
+def test_what_came_to_stand_before_a_pause_is_no_backdrop_after_it(walked):
+    """The pause was counted once for each frame before it."""
+    backdrop, body = walked
+    bag = Box(120, 40, 12, 20)
+    for k in range(5):
+        backdrop.see(picture(body, bag, seed=k), body, 1 / 30)
+        backdrop.learn(body)
+    backdrop.see(picture(body, bag, seed=9), body, 0.4)
+    assert backdrop._mine[45:55, 122:130].all()

@@ -83,6 +83,18 @@ def test_after_an_end_it_waits_before_it_asks_again() -> None:
     assert one.to_begin(2.2)
 
 
+def test_after_the_target_was_dropped_it_waits_before_it_follows_the_next() -> None:
+    """Where the tracker chooses by itself it was the same one, a fifth of a second later."""
+    one = following(retry_after=2.0)
+    one.answer(0.0, seen=True, hidden=False)
+    one.answer(1.0, seen=False, hidden=False)
+    assert one.reason_to_stop(1.0) == 'there is no target'
+    one.answer(1.2, seen=True, hidden=False)
+    assert not one.to_begin(1.2)
+    one.answer(3.1, seen=True, hidden=False)
+    assert one.to_begin(3.1)
+
+
 def test_unasked_nothing_is_followed() -> None:
     one = following(automatic=False)
     one.answer(0.0, seen=True, hidden=False)

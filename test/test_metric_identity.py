@@ -575,6 +575,32 @@ def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(
     assert (odds[0, 0] > NEW) == may_be
 
 
+@pytest.mark.parametrize(
+    'why', ['stayed', 'looks otherwise', 'stood elsewhere', 'nobody chose him', 'the camera stands']
+)
+def test_who_stood_there_is_no_part_of_the_room_when_the_camera_turns_back(why: str):
+    """Above a desk he had no person's shape: what was seen anew was room, and he was lost."""
+    reader, crowd, one = SceneReader(COLS, 0.04, 0.03, 0.0), Crowd(), Someone(0.2, 2.0)
+    color, depth = images([one])
+    color[60:], depth[60:] = GREY, 1.0  # a desk
+    scene = reader.read(Frame(color, depth, 0, CAMERA), 0.1)
+    assert scene is not None
+    assert not scene.before.any(), 'it is the first that is seen'
+    scene = dataclasses.replace(scene, stood_for=5.0 if why == 'the camera stands' else 0.5)
+    place = np.array([1.2 if why == 'stood elsewhere' else 0.2, 2.0])
+    person = crowd.welcome(place, 0.0, chosen=why != 'nobody chose him')
+    person.misses, person.upright = 3, True
+    colors = np.full_like(color, 200) if why == 'looks otherwise' else color
+    before = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(colors, depth, 0, CAMERA), 0.1)
+    assert before is not None
+    seen = before.silhouette(int(before.surfaces.labels[40, round(one.box.cx)]))
+    person.gallery.learn(look_of(before, seen, None), 0.0)
+    account = crowd.explain(scene, 1.0, reader.is_somebody)
+    assert len(account.sights) == (why == 'stayed')
+    if why == 'stayed':
+        assert box_about(scene, account.sights[0].figure.seen).iou(one.box.clipped(COLS, 60)) > 0.8
+
+
 def test_a_person_stays_in_the_world_while_the_camera_turns():
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     one.moved_to(np.array([0.1, 3.0]), 0.1)

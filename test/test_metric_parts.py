@@ -212,6 +212,34 @@ def test_a_floor_below_which_something_lies_or_that_is_lost_is_none():
         assert finder.update(view_of(wall(nearer)), motion=motion) is None
 
 
+def test_a_floor_that_is_lost_between_two_fits_is_not_the_one_from_before():
+    """Two of three frames at 30 Hz fit none: people were then sought by the height they had."""
+    down = np.array([0.0, np.cos(0.3), np.sin(0.3)])
+    finder = FloorFinder()
+    assert finder.update(view_of(tilted_floor(np.array([0.0, 1.0, 0.0]), 1.4))) is not None
+    floor = finder.update(view_of(tilted_floor(down, 2.2)), 0.03, learns=False, motion=Lost())
+    assert floor is None or floor.height == pytest.approx(2.2, abs=0.02)
+
+
+def test_places_stay_where_they_are_while_the_floor_is_out_of_sight():
+    """Told along the camera's own axes, what stood still had gone half a metre: somebody."""
+    down = np.array([0.0, np.cos(0.5), np.sin(0.5)])
+    reader = SceneReader(240, 0.04, 0.03, 0.05)
+    color = np.random.default_rng(1).integers(0, 255, (160, 240, 3), np.uint8)
+    covered = np.where(tilted_floor(down, 2.0) < 3.0, np.float32(0), np.float32(3.5))
+    scenes = []
+    for i in range(12):
+        depth = covered if i > 2 else tilted_floor(down, 2.0)
+        scene = reader.read(Frame(color, depth, i * 500_000_000, CAMERA), 0.5)
+        assert scene is not None
+        scenes.append(scene)
+    assert scenes[2].floor is not None
+    assert scenes[-1].floor is None
+    assert scenes[-1].axes == pytest.approx(scenes[2].axes, abs=0.01)
+    ray = np.array([0.0, (20 - CAMERA.cy) / CAMERA.fy, 1.0])
+    assert scenes[-1].forward[20, 120] == pytest.approx(3.5 * scenes[2].axes[1] @ ray, abs=0.02)
+
+
 def desks(rng: np.random.Generator) -> np.ndarray:
     """A room of whose floor furniture, with level tops, leaves gaps: a fifth of the lower part."""
     depth = floor_scene(1.1)
@@ -423,6 +451,21 @@ def test_what_is_seen_past_a_particle_is_the_pixel_nearest_to_it():
         place = np.array([(column - k.cx) * 2.0 / k.fx, 0.0, 2.0])
         one = HiddenCloud(place, still, still, still, 1, np.random.default_rng(1))
         assert one._seen_empty(view, 0.0).tolist() == [seen]
+
+
+def test_who_is_hidden_behind_a_camera_that_turned_away_is_where_he_was():
+    """He was put before the camera, wherever it looked, and there he was when it turned back."""
+    hidden = cloud()
+    there = hidden.mean
+    half, _ = cv2.Rodrigues(np.array([0.0, np.pi, 0.0]))
+    turn = Pose(half, np.zeros(3))
+    hidden.carried(turn)
+    for _ in range(5):
+        hidden.move(0.01)
+        hidden.weigh(0.01, view_of(wall(5.0)), 0.5)
+    assert hidden.mean[2] < -2.0
+    hidden.carried(turn)
+    assert hidden.mean == pytest.approx(there, abs=0.1)
 
 
 # -- the body -------------------------------------------------------------------------------------

@@ -39,6 +39,15 @@ def test_a_click_anywhere_on_a_thing_gives_the_thing(place: tuple[int, int]) -> 
     assert target_at(frame, *place).iou(thing) > 0.9
 
 
+def test_a_click_on_the_last_column_of_a_thing_gives_the_thing() -> None:
+    """A view's pixels are the middles of its steps: the next one to the edge is the thing's."""
+    color = np.random.default_rng(1).integers(0, 255, (1080, 1920, 3), np.uint8)
+    depth = np.full((1080, 1920), 4.0, np.float32)
+    depth[300:800, 800:1000] = 2.0
+    frame = Frame(color, depth, 0, Intrinsics(1620, 1620, 960, 540))
+    assert target_at(frame, 999, 500).iou(Box(800, 300, 200, 500)) > 0.9
+
+
 def test_a_click_into_a_hole_takes_what_is_round_it() -> None:
     thing = Box(100, 100, 60, 160)
     frame = blocks((thing, 2.0))

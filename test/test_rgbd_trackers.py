@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import tracemalloc
 from collections.abc import Iterator
@@ -190,6 +191,21 @@ def test_a_long_time_hidden_is_lost(variant: str) -> None:
     found: list[Track] = [tracker.update(frame(400, i, hz=10, pillar=183)) for i in range(40, 60)]
     assert found[-1].box is not None
     assert found[-1].box.iou(box(400)) > 0.6
+
+
+@pytest.mark.parametrize('variant', VARIANTS)
+def test_who_is_hidden_is_lost_in_time_although_stamps_went_back(variant: str) -> None:
+    """As in a loop: until the clock had caught up it was hidden for no time at all."""
+    tracker = create_tracker(variant, default_parameters(variant).replace(lost_after=2.0))
+    states = []
+    for i in range(42):
+        seen = frame(200, 600 + i, hz=10, pillar=None if i < 2 else 183)
+        if i > 6:
+            seen = dataclasses.replace(seen, stamp_ns=seen.stamp_ns - 50_000_000_000)
+        track = tracker.start(seen, box(200)) if i == 0 else tracker.update(seen)
+        states.append(track.state)
+    assert states[10] is TrackState.OCCLUDED
+    assert states[-1] is TrackState.LOST
 
 
 @pytest.mark.parametrize('variant', VARIANTS)

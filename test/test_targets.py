@@ -9,7 +9,9 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import cv2
 import numpy as np
+import people_rig
 import pytest
 from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, picture
 
@@ -17,9 +19,11 @@ from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
 from rgbd_kcf_tracker.insight import insight_in
 from rgbd_kcf_tracker.metric.by_look import ByLook
+from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance
+from rgbd_kcf_tracker.metric.newcomers import Newcomers
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.targets import MetricTargets
+from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
@@ -792,3 +796,143 @@ def test_one_target_alone_has_no_id():
     tracker = create_tracker('metric')
     assert tracker.start(both(0), left(0).box).id == 0
     assert tracker.update(both(1)).id == 0
+
+
+def seen_of(targets: TargetSet, frame: Frame) -> int:
+    return sum(track.box is not None for track in targets.update(frame).values())
+
+
+def test_people_are_told_from_the_room_by_the_first_image_that_shows_anything():
+    """A camera that warms up sends images without readings, and both were room to the end."""
+    targets = TargetSet('metric')
+    targets.everyone = True
+    people = [Someone(-0.7, 3.0), Someone(0.8, 2.5, GREEN)]
+    for i in range(6):
+        frame = picture(people, STEP * i)
+        empty = Frame(frame.color, np.full_like(frame.depth, np.nan), frame.stamp_ns, CAMERA)
+        assert seen_of(targets, frame if i else empty) == (2 if i else 0)
+
+
+@pytest.mark.parametrize('empty', [0, 3])
+def test_where_depth_ends_is_known_although_an_image_was_empty(empty: int):
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(8):
+        frame = picture([], STEP * i)
+        depth = frame.depth.copy()
+        depth[:, :40] = depth[:, -40:] = np.nan
+        if i == empty:
+            depth[:] = np.nan
+        targets.update(Frame(frame.color, depth, frame.stamp_ns, CAMERA))
+    assert targets.metric is not None
+    rim = targets.metric.account.scene.rim
+    assert (rim.left, rim.right) == (40, 40)
+
+
+def test_who_comes_while_as_many_are_remembered_as_can_be_is_not_forgotten_at_once():
+    """Two who came together above a counter forgot each other in every frame."""
+    shown = []
+    for remembered in (0, MOST_PEOPLE):
+        targets = TargetSet('metric')
+        targets.everyone = True
+        frames = 0
+        for i in range(60):
+            people = [Someone(-1 + 0.04 * i, 3.0), Someone(1.2 - 0.03 * i, 2.4, GREEN)]
+            frame = picture(people if i > 9 else [], STEP * i)
+            frame.color[60:], frame.depth[60:] = GREY, 1.5
+            frames += seen_of(targets, frame) == 2
+            assert targets.metric is not None
+            if i == 8:
+                for _ in range(remembered):
+                    crowd = targets.metric._crowd
+                    person = crowd.welcome(np.array([50.0, 50.0]), crowd.time)
+                    person.upright, person.seen_at = True, crowd.time - 5
+        shown.append(frames)
+    assert shown[1] >= shown[0] > 10
+
+
+def larger(frame: Frame, times: float, depth: bool = True) -> Frame:
+    def grown(image: np.ndarray) -> np.ndarray:
+        return cv2.resize(image, None, fx=times, fy=times, interpolation=cv2.INTER_NEAREST)
+
+    k, middle = CAMERA, (times - 1) / 2
+    camera = Intrinsics(times * k.fx, times * k.fy, times * k.cx + middle, times * k.cy + middle)
+    read = grown(frame.depth) if depth else None
+    return Frame(grown(frame.color), read, frame.stamp_ns, camera)
+
+
+def test_a_target_without_a_persons_shape_is_followed_into_images_of_another_size(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """As in the first frame, all that has no person's shape is room then, and so it was refused."""
+    monkeypatch.setattr(people_rig, 'PARTS', ((0.0, 0.5, 0.5), (0.5, 0.7, 0.5), (0.7, 1.0, 0.5)))
+    tracker = create_tracker('metric')
+    for i in range(40):
+        one = Someone(-0.6 + 0.05 * min(i, 14), 2.6)
+        frame, drawn = picture([one], STEP * i), one.box
+        if i > 24:
+            frame, drawn = larger(frame, 1.25), drawn.stretched(1.25, 1.25)
+        track = tracker.start(frame, drawn) if i == 0 else tracker.update(frame)
+        assert track.box is not None, i
+    assert track.box.iou(drawn) > 0.8
+
+
+def test_frames_without_depth_and_of_another_size_are_looked_at_in_their_own_pixels():
+    tracker = create_tracker('metric')
+    for i in range(20):
+        one = Someone(-0.6 + 0.02 * i, 3.0)
+        frame, drawn = picture([one], STEP * i), one.box
+        if i > 14:
+            frame, drawn = larger(frame, 2, depth=False), drawn.stretched(2, 2)
+        track = tracker.start(frame, drawn) if i == 0 else tracker.update(frame)
+        assert track.box is not None, i
+        assert track.box.iou(drawn) > 0.7, i
+
+
+@pytest.mark.parametrize('times', [1, 2])
+def test_how_high_a_newcomer_may_be_is_told_in_the_pixels_of_the_image(times: int):
+    one, accounts = Someone(0.0, 4.5), []
+    for size in (1, times):
+        targets = TargetSet('metric')
+        targets.everyone = True
+        targets.update(larger(picture([one], 0.0), size))
+        assert targets.metric is not None
+        accounts.append(dataclasses.replace(targets.metric.account, time=1.0))
+    newcomers = Newcomers(accounts[0], one.box, 0.0)
+    assert newcomers._grown(accounts[1]) == pytest.approx(times * newcomers._grown(accounts[0]))
+
+
+def test_frames_without_depth_are_no_misses():
+    """Nothing is looked for in them: who was followed all along had been away."""
+    tracker = create_tracker('metric', MetricParameters(use_look=False))
+    for i in range(45):
+        one = Someone(-0.6 + 0.01 * i, 3.0)
+        frame = picture([one], STEP * i)
+        if i % 11:
+            frame = Frame(frame.color, None, frame.stamp_ns, CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+        if i % 11 == 0:
+            assert track.box is not None
+            assert track.score > 0.98, i
+
+
+def test_no_number_that_a_cue_was_told_is_given_again():
+    told: list[int] = []
+
+    class Told:
+        name, weight = 'told', 0.0
+
+        def start(self, frame: Frame, box: Box, target: int) -> None:
+            told.append(target)
+
+        def weigh(self, frame: Frame, boxes: Any, target: int) -> Any:
+            return np.zeros(len(boxes))
+
+        def learn(self, frame: Frame, box: Box, target: int) -> None:
+            pass
+
+    tracker = MetricTracker(MetricParameters(), [Told()])
+    for i in range(3):
+        one = Someone(0.0, 3.0)
+        tracker.start(picture([one], STEP * i), one.box)
+    assert len(told) == len(set(told)) == 3

@@ -42,7 +42,8 @@ class FollowParameters(Parameters):
     )
     retry_after: float = parameter(
         2.0,
-        'Time after the action was refused or has ended by itself before it is asked for again.',
+        'Time after the action was refused or has ended by itself, or the target was dropped, '
+        'before it is asked for again.',
         unit='s',
         minimum=0.1,
         maximum=600.0,
@@ -86,6 +87,8 @@ class Following:
         if seen:
             self._seen = now_s
         elif not hidden:
+            if self._seen is not None:  # who drops it wants the robot to stand for a while
+                self._ended = now_s
             self._seen = None
 
     def ended(self, now_s: float) -> None:

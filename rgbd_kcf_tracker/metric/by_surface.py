@@ -287,7 +287,8 @@ class BySurface:
         if scene is not None and self.hidden_for < LEAVING:
             self._gone = max(self._gone, self.expected_body.outside(scene))
         self.hidden_for += dt
-        self._misses += 1
+        # Where a frame has no depth, nothing was looked for.
+        self._misses += scene is not None
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
 
     def seen_elsewhere(self, view: DepthView, box: Box) -> None:

@@ -57,6 +57,7 @@ class Newcomers:
 
     def __init__(self, account: Account | None, box: Box, since: float) -> None:
         self._since, self._height = since, box.height
+        self._pixels = None if account is None else _pixels(account.scene)
         self.beside: set[int] = set()
         self._ends: Sides | None = None if account is None else account.scene.ends(box)
 
@@ -139,9 +140,14 @@ class Newcomers:
 
         He was as high as the box in which he was chosen.
         """
-        pixels = account.scene.view.intrinsics.fy * account.scene.view.step
-        first = STATURE * pixels / self._height
+        pixels = _pixels(account.scene)
+        first = STATURE * (self._pixels or pixels) / self._height
         return STATURE * pixels / max(first - WALK * (account.time - self._since), NEAREST)
+
+
+def _pixels(scene: Scene) -> float:
+    """Pixels of the image that a metre is high at one metre's distance."""
+    return scene.view.intrinsics.fy * scene.view.step
 
 
 def _reach(last: Box, scene: Scene, depth: float, unseen: float) -> Box:

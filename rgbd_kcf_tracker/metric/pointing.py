@@ -98,7 +98,9 @@ def _person_at(frame: Frame, u: float, v: float) -> Box | None:
 
 def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
     """The box round the connected surface at a pixel; raises as :func:`target_at`."""
-    row, column = _nearest(view.depth > 0, v / view.step, u / view.step, NEAREST)
+    # The view's pixels are those in the middle of each step.
+    half = view.step // 2
+    row, column = _nearest(view.depth > 0, (v - half) / view.step, (u - half) / view.step, NEAREST)
     if row < 0:
         raise BoxError(f'there is no depth reading near point {u:g},{v:g}: point elsewhere')
     depth = float(view.depth[row, column])

@@ -58,6 +58,7 @@ class MetricTargets:
     Args:
         parameters: see :class:`MetricParameters`.
         cues: further ones for the verdict.
+        first: the number by which cues know the first person.
 
     Attributes:
         everyone: whether people whom nobody chose get tracks too.
@@ -66,12 +67,14 @@ class MetricTargets:
         account: how the last frame was explained; None where it had no depth.
     """
 
-    def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
+    def __init__(
+        self, parameters: MetricParameters, cues: Sequence[Cue] = (), first: int = 1
+    ) -> None:
         self._parameters = parameters
         self._cues = cues
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
-        self._reader, self._crowd = self._new_memory()
+        self._reader, self._crowd = self._new_memory(first)
         self._followers: dict[int, Follower] = {}
         self._waiting: list[int] = []
         self._names: dict[int, int] = {}
@@ -117,6 +120,11 @@ class MetricTargets:
         return number
 
     @property
+    def next_person(self) -> int:
+        """The number by which cues will know who is new."""
+        return self._crowd.next
+
+    @property
     def camera_motion(self) -> Pose | None:
         """How the camera seems to have moved in the last frame, by the picture, not by its poses.
 
@@ -148,6 +156,8 @@ class MetricTargets:
         dt = self._perceive(frame)
         turns = self._turns(dt)
         view = self._reader.last_view
+        if view is not None and frame.depth is None:  # or the image may have another size by now
+            view = view.at(frame, self._parameters.view_width)
         tracks = {
             number: dataclasses.replace(
                 follower.step(frame, self.account, view, dt, number in turns), id=number
@@ -188,9 +198,9 @@ class MetricTargets:
 
     # -- parts ------------------------------------------------------------------------------------
 
-    def _new_memory(self) -> tuple[SceneReader, Crowd]:
+    def _new_memory(self, first: int) -> tuple[SceneReader, Crowd]:
         p = self._parameters
-        return SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin), Crowd()
+        return SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin), Crowd(first)
 
     def _follower(self, frame: Frame, box: Box) -> Follower:
         """Whoever is in a box of the frame that was perceived."""
@@ -227,7 +237,7 @@ class MetricTargets:
         """Start on all where they were a frame ago: what was remembered is in other metres."""
         before = {number: each.track for number, each in self._followers.items()}
         others = self._others(frame) if self.everyone else {}
-        self._reader, self._crowd = self._new_memory()
+        self._reader, self._crowd = self._new_memory(self._crowd.next)
         self._names, self._followers, self._metres = {}, {}, None
         self._perceive(frame)
         self._unlearned = True
@@ -278,7 +288,9 @@ class MetricTargets:
         if frame.depth is not None and self._metres is None:
             self._metres, self._told_at = self._camera or Intrinsics.guess(*size), None
         scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
-        self.account = None if scene is None else self._crowd.explain(scene, self._time)
+        self.account = None
+        if scene is not None:
+            self.account = self._crowd.explain(scene, self._time, self._reader.is_somebody)
         return dt
 
     def _turns(self, dt: float) -> list[int]:
@@ -422,7 +434,8 @@ class MetricTracker:
     def start(self, frame: Frame, box: Box) -> Track:
         """See :meth:`~rgbd_kcf_tracker.track.Tracker.start`."""
         require_inside(box, frame)
-        self._targets = MetricTargets(self._parameters, self._cues)
+        first = 1 if self._targets is None else self._targets.next_person
+        self._targets = MetricTargets(self._parameters, self._cues, first)
         self._number = self._targets.add(frame, box)
         return dataclasses.replace(self._targets.started(self._number), id=0)
 

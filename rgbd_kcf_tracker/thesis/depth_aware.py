@@ -116,7 +116,7 @@ class DepthAwareTracker(ABC):
         p = self._depth_parameters
         self._box, self.response = box, None
         self._image_size = (frame.width, frame.height)
-        self._stamp_ns = self._seen_ns = frame.stamp_ns
+        self._stamp_ns, self._unseen_ns = frame.stamp_ns, 0
         self._hidden = False
         self._model = KcfModel(box.width, box.height, p)
         self._model.train(frame, box.cx, box.cy)
@@ -133,6 +133,9 @@ class DepthAwareTracker(ABC):
         if (frame.width, frame.height) != self._image_size:
             self._rescale(frame, self._model)
         interval = frame.seconds_since(self._stamp_ns, 0.0, _LONGEST_INTERVAL_S)
+        self._unseen_ns += max(
+            frame.stamp_ns - self._stamp_ns, 0
+        )  # stamps may go back, as in a loop
         self._stamp_ns = frame.stamp_ns
         found = self._follow(frame, self._model, interval)
         if found is not None:
@@ -208,7 +211,7 @@ class DepthAwareTracker(ABC):
         again = self._hidden
         trust = 1.0 if again else self._trust(difference, found.response)
         self._hidden = False
-        self._seen_ns = frame.stamp_ns
+        self._unseen_ns = 0
         self._box = self._box_at(found)
         model.train(frame, self._box.cx, self._box.cy, trust)
         if frame.depth is None:
@@ -237,7 +240,7 @@ class DepthAwareTracker(ABC):
 
     def _hidden_s(self) -> float:
         """Seconds since the target was last seen; 0 while it is."""
-        return max((self._stamp_ns - self._seen_ns) * 1e-9, 0.0) if self._hidden else 0.0
+        return self._unseen_ns * 1e-9 if self._hidden else 0.0
 
     def _track(self, frame: Frame, found: Detection) -> Track:
         box = Box.from_center(found.fine_cx, found.fine_cy, self._box.width, self._box.height)

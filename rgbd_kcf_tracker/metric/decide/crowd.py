@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigne
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, Missing, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
+from rgbd_kcf_tracker.metric.decide.stayed import stayed
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery
@@ -71,15 +72,19 @@ HELD = -2
 class Crowd:
     """Gives everyone who stands before the room an identity and keeps it.
 
+    Args:
+        first: number of the first.
+
     Attributes:
+        next: number of whoever comes next.
         people: all who are known.
         time: seconds of the last frame.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, first: int = 1) -> None:
         self.people: list[Person] = []
         self.time = 0.0
-        self._next = 1
+        self.next = first
         self._frames = 0
         self._shape = 0, 0
         self._axes = CAMERA_AXES
@@ -92,12 +97,15 @@ class Crowd:
         """Somebody new at ``place``, ``(2,)`` metres."""
         others = [p for p in self.people if not p.chosen]
         if len(others) >= MOST_PEOPLE:
-            forgotten = min(others, key=lambda p: (p.alive, p.seen_at))
+            # Who has just come may not have shown yet that he is somebody.
+            forgotten = min(
+                others, key=lambda p: (self.time - p.seen_at < RECENT, p.alive, p.seen_at)
+            )
             if forgotten.alive:
                 self._arrivals.forgotten += is_new(forgotten.again, self._arrivals.last)
             self.forget(forgotten)
-        person = Person(self._next, place, time, chosen)
-        self._next += 1
+        person = Person(self.next, place, time, chosen)
+        self.next += 1
         self.people.append(person)
         return person
 
@@ -192,8 +200,16 @@ class Crowd:
         for other in self.people:
             other.forget(person.number)
 
-    def explain(self, scene: Scene, time: float) -> Account:
-        """Explain the next frame at ``time`` seconds; :meth:`learn` must follow."""
+    def explain(
+        self, scene: Scene, time: float, opens: Callable[[Silhouette], None] | None = None
+    ) -> Account:
+        """Explain the next frame; :meth:`learn` must follow.
+
+        Args:
+            scene: of the frame.
+            time: seconds.
+            opens: takes what turns out to be somebody out of the room.
+        """
         self.time = time
         self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
         if isinstance(scene.motion, Lost):
@@ -201,16 +217,20 @@ class Crowd:
             for person in self.people:
                 person.mobile, person.last, person.hidden = False, None, False
         if scene.view.shape != self._shape:
-            # The pixels of a picture of another size are no places in this one.
-            self._shape = scene.view.shape
+            # The pixels of a picture of another size are no places in this one, and the room begins
+            # anew, with whoever has no person's shape.
+            self._shape, self._frames = scene.view.shape, 1
             for person in self.people:
-                person.last, person.hidden = None, False
+                person.mobile, person.last, person.hidden = False, None, False
         if isinstance(scene.motion, Pose):
             for person in self.people:
                 person.carried(scene.motion, self._axes, scene.axes)
         self._axes = scene.axes
         for person in self.people:
             person.gallery.mixed &= time - person.first_seen < PARTING
+        if opens is not None:
+            for seen in stayed(scene, self.people):
+                opens(seen)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, look_of(scene, f.seen, f.top)) for f in figures]

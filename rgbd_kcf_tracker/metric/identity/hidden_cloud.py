@@ -34,6 +34,9 @@ to 0.25 m deep, and far readings are off by some centimetres; as for everybody
 EMPTY_TIME = 0.12
 """Seconds in which the weight of such a particle falls to a third: some frames at 30 Hz, as one may
 have a wrong reading or a gap between the legs, and nearly at once at 5 Hz."""
+NEAREST = 0.2
+"""Metres before the camera up to which somebody comes; what a camera that turned away has behind
+it is where it is."""
 KERNEL = 0.2
 """Metres of the kernel that makes a density of the particles: about half of a body's width, so that
 some hundreds of them leave no holes where somebody may be."""
@@ -77,8 +80,10 @@ class HiddenCloud:
         noise = ROAM * np.sqrt(1 - keep**2)
         self._velocities *= keep
         self._velocities += noise * self._rng.standard_normal(self._velocities.shape)
+        ahead = self._positions[:, 2] >= NEAREST
         self._positions += self._velocities * dt
-        np.maximum(self._positions[:, 2], 0.2, out=self._positions[:, 2])
+        z = self._positions[:, 2]
+        np.maximum(z, NEAREST, out=z, where=ahead)
 
     def weigh(self, dt: float, view: DepthView, middle: float) -> None:
         """Weigh by what the camera sees.
@@ -105,10 +110,13 @@ class HiddenCloud:
         k = view.intrinsics
         rows, cols = view.shape
         x, y, z = self._positions.T
-        u = np.rint(x * k.fx / z + k.cx).astype(np.int32)
-        v = np.rint((y + middle) * k.fy / z + k.cy).astype(np.int32)
-        inside = (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
-        seen = view.depth[np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)]
+        ahead = z >= NEAREST
+        z = np.maximum(z, NEAREST)
+        u = np.rint(x * k.fx / z + k.cx)
+        v = np.rint((y + middle) * k.fy / z + k.cy)
+        inside = ahead & (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
+        row, column = np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)
+        seen = view.depth[row.astype(np.intp), column.astype(np.intp)]
         empty: npt.NDArray[np.bool_] = inside & (seen > z + EMPTY_MARGIN)
         return empty
 

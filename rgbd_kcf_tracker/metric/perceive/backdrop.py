@@ -146,7 +146,7 @@ class Backdrop:
         self._pieces = _pieces(none)
         self._likely = self._share = self._fill = 0.0
         self._told = False
-        self._same = np.zeros(shape, np.uint8)
+        self._same, self._same_for = np.zeros(shape, np.uint8), np.zeros(shape, np.float32)
         self._area = self._may_part = 0
         self.met = False
         self._mine = self._within(box.scaled(MARGIN))
@@ -167,12 +167,14 @@ class Backdrop:
             self._start(image, gray, box)
             return
         self._same += self._same < 255
-        self._same[cv2.absdiff(image, self._last).max(axis=2) > SAME] = 0
+        self._same_for += np.float32(dt)
+        changed_now = cv2.absdiff(image, self._last).max(axis=2) > SAME
+        self._same[changed_now] = self._same_for[changed_now] = 0
         self._follow_light(image)
         apart = cv2.absdiff(image, cv2.convertScaleAbs(self._colors)).max(axis=2)
         self._part_in_pieces(self._known & (apart > DIFFERS))
         # Until an outline tells the target from the rest, all that moves may be a part of it.
-        self._mine = (self._differs & (self._same * dt < SETTLED)) | around
+        self._mine = (self._differs & (self._same_for < SETTLED)) | around
         self._last, self._gray = image, gray
 
     def learn(self, box: Box) -> None:
@@ -299,7 +301,7 @@ class Backdrop:
         """Learn what has not changed, but for what may be the target's; the latter is returned."""
         within = self._within(box.scaled(MARGIN))
         mine = self._mine | within
-        self._same[within] = 0
+        self._same[within] = self._same_for[within] = 0
         still = (self._same >= STABLE) & ~mine
         np.copyto(self._colors, self._last, where=still[:, :, None])
         self._known |= still

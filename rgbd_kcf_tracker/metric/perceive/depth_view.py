@@ -44,6 +44,13 @@ def median_depth(frame: Frame, box: Box) -> float:
     return float(np.median(valid)) if valid.size > MOST * depth.size else math.nan
 
 
+def _viewed(frame: Frame, width: int) -> tuple[int, Intrinsics]:
+    """The step of a view of a frame at about ``width`` columns, and its intrinsics."""
+    step = max(1, min(round(frame.width / width), frame.height // 2))
+    k, half = frame.intrinsics or Intrinsics.guess(frame.width, frame.height), step // 2
+    return step, Intrinsics(k.fx / step, k.fy / step, (k.cx - half) / step, (k.cy - half) / step)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthView:
     """Every ``step``-th pixel of a depth image.
@@ -69,19 +76,22 @@ class DepthView:
         """
         if frame.depth is None or min(frame.width, frame.height) < 2:
             return None
-        step = max(1, min(round(frame.width / width), frame.height // 2))
+        step, intrinsics = _viewed(frame, width)
         half = step // 2
         depth = np.array(frame.depth[half::step, half::step])
         missing = ~is_reading(depth)
         found = frame.depth[::step, ::step][: depth.shape[0], : depth.shape[1]][missing]
         found[~is_reading(found)] = 0.0
         depth[missing] = found
-        k = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
-        return cls(
-            depth,
-            step,
-            Intrinsics(k.fx / step, k.fy / step, (k.cx - half) / step, (k.cy - half) / step),
-        )
+        return cls(depth, step, intrinsics)
+
+    def at(self, frame: Frame, width: int) -> DepthView:
+        """The same for a frame of another size without depth: what was read is not in it."""
+        step, intrinsics = _viewed(frame, width)
+        rows, cols = (len(range(step // 2, side, step)) for side in (frame.height, frame.width))
+        if (step, (rows, cols)) == (self.step, self.shape):
+            return self
+        return DepthView(np.zeros((rows, cols), np.float32), step, intrinsics)
 
     def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
         """Rows and columns of what lies between these places, as far as they are in the view."""

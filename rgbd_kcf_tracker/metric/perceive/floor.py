@@ -187,7 +187,7 @@ class FloorFinder:
         self._hidden = math.inf if isinstance(motion, Lost) else self._hidden + seconds
         if isinstance(motion, Pose) and self._floor is not None:
             self._floor = self._floor.carried(motion, view.intrinsics)
-        if self._floor is not None and not learns:
+        if self._floor is not None and not learns and not isinstance(motion, Lost):
             return self._floor
         h = view.shape[0]
         top = h // 3 + REACH

@@ -33,6 +33,9 @@ LEARNING_STEP = 0.09
 """Seconds after which what lasts (room, floor, looks, colours) is learned again while the
 camera stands and frames come faster than twice as often: at 30 Hz from every third frame, and at
 20 Hz and less from each."""
+SHOWS = 0.2
+"""Share of a view that has readings from which it tells where depth ends: of less, as where only
+somebody before the camera is near enough, his outline would be that end."""
 CAMERA_AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """The axes along which places are told where no floor is known."""
 
@@ -130,8 +133,10 @@ class SceneReader:
         self._jump_per_metre = jump_per_metre
         self._floor_margin = floor_margin
         self._floors = FloorFinder()
+        self._level: Floor | None = None
         self._rim: Rim | None = None
         self._shape: tuple[int, int] = (0, 0)
+        self._begun = False
         self._light = Light()
         self._ego = EgoMotion()
         self._pose: Pose | None = None
@@ -155,7 +160,7 @@ class SceneReader:
         self.last_view = view
         if view.shape != self._shape:
             self._rim, self._shape = None, view.shape
-            self._floors = FloorFinder()
+            self._floors, self._level = FloorFinder(), None
         learns, since = self._due(seconds)
         image = view_image(frame.color, view.step, view.shape)
         motion = way = self._move(image, view, frame.pose, seconds)
@@ -166,16 +171,14 @@ class SceneReader:
         )
         elevation = floor.elevation(view.depth) if floor is not None else None
         forward, axes = view.depth, CAMERA_AXES
-        if floor is not None and elevation is not None:
-            forward = floor.forward(view.depth, elevation)
-            axes = floor.axes(view.intrinsics)
+        level = self._level_after(floor, view, motion)
+        if level is not None:
+            above = level.elevation(view.depth) if elevation is None else elevation
+            forward = level.forward(view.depth, above)
+            axes = level.axes(view.intrinsics)
         mask = standing(view, elevation, self._floor_margin)
         surfaces = surfaces_in(view.depth, mask, self._jump, self._jump_per_metre)
-        if self._rim is None:
-            self._rim = Rim.of(view)
-        elif learns:
-            self._rim = Rim.of(view).common(self._rim)
-        rim = self._rim
+        rim = self._rim_of(view, learns)
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
 
         def upright(whole: bool) -> UprightPeople:
@@ -204,6 +207,29 @@ class SceneReader:
             since=since,
         )
 
+    def _level_after(
+        self, floor: Floor | None, view: DepthView, motion: Pose | Lost | None
+    ) -> Floor | None:
+        """Along what places are told: the floor, or where it was while nothing shows of it.
+
+        A floor that goes out of sight, hidden by somebody near, moves nobody.
+        """
+        if isinstance(motion, Lost):
+            self._level = None
+        elif isinstance(motion, Pose) and self._level is not None:
+            self._level = self._level.carried(motion, view.intrinsics)
+        self._level = floor or self._level
+        return self._level
+
+    def _rim_of(self, view: DepthView, learns: bool) -> Rim:
+        """Where depth ends, by this view and those before; an empty one says nothing of it."""
+        if self._rim is None:
+            shows = np.count_nonzero(view.depth) > SHOWS * view.depth.size
+            self._rim = Rim.of(view) if shows else None
+        elif learns and view.depth.any():
+            self._rim = Rim.of(view).common(self._rim)
+        return self._rim or Rim()
+
     def _due(self, seconds: float) -> tuple[bool, float | None]:
         """Whether the room is learned from this frame, and :attr:`Scene.since`."""
         self._learned += seconds
@@ -231,7 +257,10 @@ class SceneReader:
         learns: bool,
     ) -> None:
         """Show the room a view; ``upright`` tells who in it is a person by his shape alone."""
-        if self.room.depth.shape != view.shape or isinstance(motion, Lost):
+        begins = self.room.depth.shape != view.shape or isinstance(motion, Lost)
+        if begins or not self._begun:
+            # A camera that warms up sends images without readings: people come with the first.
+            self._begun = bool(view.depth.any())
             self.room.restart(view.depth, upright(False).mask)
             self._light.restart()
             return
