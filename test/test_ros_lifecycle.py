@@ -84,8 +84,12 @@ def test_without_autostart_it_waits_for_the_manager(rig: Rig) -> None:
         rig.send(5)
         time.sleep(0.2)
         assert len(rig.boxes) == 5
-        assert rig.fresh_values()['message'] == 'inactive'
+        values = rig.fresh_values()
+        assert (values['message'], values['state']) == ('inactive', 'TRACKING')
+        node.statistics._image_time -= 3600
         assert change(rig, Transition.TRANSITION_ACTIVATE)
+        # For as long as it did not listen no image could come: that is no fault of the camera.
+        assert node.statistics.snapshot().image_age_s < 1800
         rig.await_listener(node)
         rig.play(range(6, 9))
         assert rig.box().iou(scene(8)[2]) > 0.6
@@ -147,6 +151,24 @@ def test_hundreds_of_lifecycle_cycles(ros_domain: int) -> None:
     assert resident_mb(os.getpid()) - memory < 5
     node.destroy_node()
     rclpy.shutdown(context=context)
+
+
+def test_an_activation_that_fails_leaves_nothing_that_listens(ros_domain: int) -> None:
+    """The images of an inactive node went on, and more of them with each attempt."""
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    wrong = 'qos_overrides./color/camera_info.subscription.reliability'
+    settings = overrides({'autostart': False, wrong: 'bogus'})
+    node = TrackerNode(context=context, parameter_overrides=settings)
+    try:
+        assert node.trigger_configure().name == 'SUCCESS'
+        before = sorted(s.topic_name for s in node.subscriptions)
+        for _ in range(2):
+            assert node.trigger_activate().name != 'SUCCESS'
+            assert sorted(s.topic_name for s in node.subscriptions) == before
+    finally:
+        node.destroy_node()
+        rclpy.shutdown(context=context)
 
 
 def test_a_worker_that_is_stuck_shares_nothing_with_its_successor(

@@ -76,32 +76,36 @@ class Subscriptions:
         overriding = QoSOverridingOptions.with_default_policies()
         policies = [kind.name.lower() for kind in overriding.policy_kinds]
         _check_overrides(node, (one, other, node.resolve_topic_name(CAMERA_INFO)), policies)
-        for topic, callback in ((COLOR, color), (DEPTH, depth)):
-            self._all[topic] = node.create_subscription(
-                Image if transports[topic] == RAW else CompressedImage,
-                names[topic],
-                callback,
+        try:
+            for topic, callback in ((COLOR, color), (DEPTH, depth)):
+                self._all[topic] = node.create_subscription(
+                    Image if transports[topic] == RAW else CompressedImage,
+                    names[topic],
+                    callback,
+                    image_qos(settings),
+                    event_callbacks=NO_EVENTS,
+                    qos_overriding_options=overriding,
+                )
+            self._all[CAMERA_INFO] = node.create_subscription(
+                CameraInfo,
+                CAMERA_INFO,
+                camera_info,
                 image_qos(settings),
                 event_callbacks=NO_EVENTS,
                 qos_overriding_options=overriding,
             )
-        self._all[CAMERA_INFO] = node.create_subscription(
-            CameraInfo,
-            CAMERA_INFO,
-            camera_info,
-            image_qos(settings),
-            event_callbacks=NO_EVENTS,
-            qos_overriding_options=overriding,
-        )
-        for request, kind, callback in zip(
-            REQUESTS,
-            (RegionOfInterest, PointStamped, RegionOfInterest, UInt32),
-            (init, init_point, add, remove),
-            strict=True,
-        ):
-            self._all[request] = node.create_subscription(
-                kind, request, callback, REQUEST_DEPTH, event_callbacks=NO_EVENTS
-            )
+            for request, kind, callback in zip(
+                REQUESTS,
+                (RegionOfInterest, PointStamped, RegionOfInterest, UInt32),
+                (init, init_point, add, remove),
+                strict=True,
+            ):
+                self._all[request] = node.create_subscription(
+                    kind, request, callback, REQUEST_DEPTH, event_callbacks=NO_EVENTS
+                )
+        except BaseException:  # as for a wrong override: an inactive node hears no image
+            self.destroy()
+            raise
 
     def topic(self, name: str) -> str:
         """The full name of an input after remapping."""
