@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
 from people_rig import BLUE, GREEN, Someone, picture
 
 from rgbd_kcf_tracker import Box, Track, TrackState
@@ -168,6 +171,28 @@ def test_everyone_is_followed_beside_the_chosen_one() -> None:
     run(made, 12, 1)
     assert ids(made) == [made.track.id]
     assert not refused
+
+
+def test_ids_of_whom_nobody_remembers_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, _, _ = session()
+    made.everyone = True
+    run(made, 0, 3, [])
+    run(made, 3, 6)
+    made.choose(lambda _: FIRST.box)
+    run(made, 9, 2)
+    known = {track.id: track.box for track in (made.track, *made.others)}
+    assert len(known) == 3
+    with monkeypatch.context() as patched:
+        for inner in range(1000, 1500):  # passers-by, whom the set has forgotten a frame later
+            passing = {1: made.track, inner: Track(FIRST.box, TrackState.TRACKING, id=inner)}
+            passing[made._chosen] = replace(made.track, id=made._chosen)
+            patched.setattr(made._targets, 'update', lambda _, tracks=passing: dict(tracks))
+            made.process(picture(ALL, 1.1))
+            assert len(made._ids) <= 4
+    run(made, 12, 2)
+    assert ids(made) == sorted(known)
+    tracks = (made.track, *made.others)
+    assert all(track.box.iou(known[track.id]) > 0.6 for track in tracks)
 
 
 def test_everyone_is_refused_where_the_variant_cannot() -> None:

@@ -124,6 +124,17 @@ def test_buffers_are_bounded() -> None:
     assert pairer.waiting == (10, 0)
 
 
+def test_depth_has_bounds_of_its_own_where_its_images_are_held() -> None:
+    """A recording that is read holds numbers of images, and as many as it needs."""
+    depths = [f'd{33 * i}' for i in range(1100)]
+    for pairer, most in ((patient_pairer(), 1000), (patient_pairer(depth_capacity=60), 60)):
+        feed(pairer, *depths, flush=False)
+        assert pairer.waiting == (0, most)
+    pairer = patient_pairer(depth_capacity=60)
+    feed(pairer, *(f'c{33 * i}' for i in range(200)), flush=False)
+    assert pairer.waiting == (200, 0)
+
+
 def test_time_jumps_back_as_when_a_bag_loops() -> None:
     pairer: StampPairer[str, str] = StampPairer()
     first = [e for i in range(60) for e in (f'c{33 * i}', f'd{33 * i}')]

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import pytest
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.live import replay_lockstep
 from rgbd_kcf_tracker.live.prefetch import prefetched
 from rgbd_kcf_tracker.live.replay_lockstep import AHEAD, Answers
 from rgbd_kcf_tracker.live.replay_message import Message, Role
@@ -121,7 +122,7 @@ def test_answers_of_exact_pairs() -> None:
     clock.time += 0.25
     answers.answered(10)
     assert answers.wait(0.0, threading.Event())
-    assert answers.latencies_s == [pytest.approx(0.25)]
+    assert list(answers.latencies_s) == [pytest.approx(0.25)]
     assert (answers.pairs, answers.unanswered) == (1, 0)
 
 
@@ -189,6 +190,32 @@ def test_foreign_and_early_answers_do_no_harm() -> None:
     answers.sent_depth(10 * MS)
     assert answers.wait(0.0, threading.Event())
     assert len(answers.latencies_s) == 1
+
+
+def test_time_that_jumps_back_onto_a_stamp_that_waits() -> None:
+    """The image that waited is decided on, the new one of its stamp waits in its place."""
+    answers = Answers(has_depth=True)
+    for stamp in (3000, 4000, 5000, 5500, 6000, 6500, 7000, 5000):
+        answers.sent_color(stamp * MS)
+    assert answers.pairs == 7
+    assert answers._undecided.keys() == {5000 * MS}
+    assert len(answers.give_up()) == 7
+    assert answers.wait(0.0, threading.Event())
+    answers.sent_depth(5000 * MS)
+    assert answers.give_up() == [5000 * MS]
+    assert not answers._undecided
+
+
+def test_a_replay_that_loops_keeps_so_many_latencies(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(replay_lockstep, 'LATENCIES', 10)
+    clock = HandClock()
+    answers = Answers(has_depth=False, now=clock)
+    for stamp in range(25):
+        answers.sent_color(stamp)
+        clock.time += stamp
+        answers.answered(stamp)
+    assert answers.heard == answers.pairs == 25
+    assert list(answers.latencies_s) == pytest.approx(range(15, 25))
 
 
 def test_player_sends_everything_in_order() -> None:
@@ -346,6 +373,25 @@ def test_lockstep_sends_again_what_was_lost_then_gives_up() -> None:
     assert player.progress.repeated > 0
     assert any('again' in w for w in warnings)
     assert any('going on without' in w for w in warnings)
+
+
+def test_an_answer_that_comes_as_it_is_given_up_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = Answers(has_depth=False)
+    warnings: list[str] = []
+    give_up = answers.give_up
+    monkeypatch.setattr(answers, 'give_up', lambda: answers.answered(1000 * MS) or give_up())
+    player = Player(
+        lambda m: None,
+        Pacer(0.0),
+        answers,
+        lockstep=True,
+        answer_timeout_s=0.02,
+        warn=warnings.append,
+    )
+    image = next(recording(1))
+    assert player.play([image], threading.Event())
+    assert (answers.heard, answers.unanswered) == (1, 0)
+    assert not any('going on without' in words for words in warnings)
 
 
 def test_lockstep_says_that_it_cannot_tell_answers_of_one_stamp_apart() -> None:

@@ -16,12 +16,14 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
-from rgbd_kcf_tracker.live.intake import Intake
+from rgbd_kcf_tracker.live.intake import PATIENT_DEPTHS, Intake
+from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
-from rgbd_kcf_tracker.live.timeline import Timeline
+from rgbd_kcf_tracker.live.timeline import StampRepair, Timeline
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import Camera
+from rgbd_kcf_tracker.ros.diagnostics import NodeState, judge
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 MS = 1_000_000
@@ -219,6 +221,73 @@ def test_stamps_that_never_change_still_pair(stamp: int) -> None:
     assert [c.depth.data for c in captures if c.depth] == [b'd%d' % i for i in range(10)]
 
 
+@pytest.mark.parametrize('patient', [False, True])
+@pytest.mark.parametrize('stamp', [0, BASE])
+@pytest.mark.parametrize(
+    ('late', 'first'), [('depth', 1), ('depth', 2), ('depth', 15), ('color', 2)]
+)
+def test_stamps_that_never_change_pair_where_one_stream_begins_later(
+    late: str, first: int, stamp: int, patient: bool
+) -> None:
+    made = intake(patient)
+    events = [(at, 'poll', 0) for at in range(0, 4000, 25)]
+    for index in range(60):
+        for what, after_ms in (('color', 0), ('depth', 5)):
+            if index >= first or what != late:
+                events.append((index * 33 + after_ms, what, index))
+    captures = []
+    for at, what, index in sorted(events):
+        now = BASE + at * MS
+        if what == 'poll':
+            captures += made.poll(now)
+        else:
+            captures += getattr(made, what)(message(stamp, b'%d %s' % (index, what.encode())), now)
+    colors = [int(c.color.data.split()[0]) for c in captures]
+    paired = {
+        int(c.color.data.split()[0]): int(c.depth.data.split()[0]) for c in captures if c.depth
+    }
+    assert colors == list(range(first if late == 'color' else 0, 60))
+    assert all(color == depth for color, depth in paired.items())
+    assert set(range(first + 1, 60)) <= set(paired)
+
+
+@pytest.mark.parametrize('late_ms', [0, 5, 25, 400])
+def test_stamps_of_a_clock_are_kept(late_ms: int) -> None:
+    """Also those of a coarse one, where two images now and then have one stamp."""
+    standing: dict[int, int] = {}
+    color, depth = StampRepair(standing), StampRepair(standing)
+    for coarse in (1, 50):
+        arrivals = [index * 33 for index in range(60)]
+        stamps = [BASE + at // coarse * coarse * MS for at in arrivals]
+        repaired: dict[StampRepair, list[int]] = {color: [], depth: []}
+        events = [(at, 0, stamp) for at, stamp in zip(arrivals, stamps, strict=True)]
+        # Depth begins later, too: what it missed changes nothing.
+        events += [(at + late_ms, 1, stamp) for at, _, stamp in events[4:]]
+        for at, which, stamp in sorted(events):
+            repair = depth if which else color
+            told = repair(stamp, BASE + at * MS, b'%d' % at)
+            assert told is not None
+            repaired[repair].append(told)
+            assert len(standing) <= 2
+        wanted = [
+            stamp if stamp != before else stamp + 33 * MS
+            for before, stamp in zip([0, *stamps], stamps, strict=False)
+        ]
+        assert repaired[color] == wanted
+        assert repaired[depth] == wanted[4:]
+        color, depth = StampRepair(standing), StampRepair(standing)
+        standing.clear()
+
+
+def test_repaired_stamps_rise_where_the_last_of_one_stamp_comes_late() -> None:
+    repair = StampRepair({})
+    told = [
+        repair(BASE + stamp * MS, BASE + arrival * MS, b'%d' % arrival)
+        for stamp, arrival in ((0, 0), (50, 50), (50, 110), (100, 111), (150, 150))
+    ]
+    assert told == [BASE + ns for ns in (0, 50 * MS, 110 * MS, 110 * MS + 1, 150 * MS)]
+
+
 def test_the_same_message_again_is_dropped_and_counted() -> None:
     made = intake()
     captures = []
@@ -317,12 +386,100 @@ def test_a_loop_goes_on_with_pairs() -> None:
     assert all(c.depth is not None for c in captures)
 
 
-def test_depth_without_colour_is_bounded() -> None:
-    made = intake()
+@pytest.mark.parametrize(('patient', 'most'), [(False, 30), (True, PATIENT_DEPTHS)])
+def test_depth_without_colour_is_bounded(patient: bool, most: int) -> None:
+    made = intake(patient)
     for index in range(500):
         made.depth(message(BASE + index * 33 * MS), index * 33 * MS)
-    assert made._pairer.waiting[1] <= 30
-    assert made._statistics.snapshot().counts['depth_without_color'] >= 470
+    assert made._pairer.waiting[1] == most <= 60
+    assert made._statistics.snapshot().counts['depth_without_color'] == 500 - most
+
+
+def test_what_waits_for_camera_info_fits_the_queue() -> None:
+    """Of a source as fast as it can be, so that no pair pushes all the others out at once."""
+    made = intake(patient=True, camera=False, queue_size=20)
+    gate = threading.Event()
+    worker = Worker(lambda _: gate.wait(30), pytest.fail, keep=20)
+    dropped, held = [], 0
+    for index in range(60):
+        now = index * 3 * MS
+        captures = made.color(message(BASE + index * 33 * MS), now)
+        captures += made.depth(message(BASE + index * 33 * MS), now)
+        dropped.append(worker.submit(*captures) if captures else 0)
+        held = max(held, len(made._held))
+    gate.set()
+    assert worker.stop()
+    assert held == 19
+    assert max(dropped) == 1
+
+
+@pytest.mark.parametrize('patient', [False, True])
+@pytest.mark.parametrize(
+    ('every', 'off_ms', 'alarmed'),
+    [(1, 0, False), (2, 0, False), (8, 0, False), (1, 16, True), (2, 16, True)],
+)
+def test_a_lower_rate_of_depth_is_no_alarm_and_other_stamps_are(
+    every: int, off_ms: int, alarmed: bool, patient: bool
+) -> None:
+    made = intake(patient, tolerance_s=0.005)
+    statistics = made._statistics
+    for index in range(220):
+        now = index * 33 * MS
+        made.color(message(BASE + now), now)
+        if index % every == 0:
+            made.depth(message(BASE + now + off_ms * MS), now + 5 * MS)
+        made.poll(now + 10 * MS)
+        if index == 100:
+            statistics.snapshot()
+    snapshot = statistics.snapshot()
+    state = NodeState('tracker', 'active', publishers=1, depth_publishers=1)
+    level, sentence = judge(state, snapshot)
+    assert (level != b'\0') == alarmed, sentence
+    assert ('are the streams synchronised' in sentence) == alarmed
+    between, alone = (
+        snapshot.recent.get(f'color_{what}_depth', 0) for what in ('between', 'without')
+    )
+    if alarmed:
+        assert between == 0
+        assert alone > 100
+    else:
+        assert between == pytest.approx(119 * (1 - 1 / every), abs=8)
+        assert alone == 0
+
+
+@pytest.mark.parametrize('patient', [False, True])
+def test_depth_that_is_lost_on_the_way_is_an_alarm(patient: bool) -> None:
+    made = intake(patient)
+    rng = np.random.default_rng(3)
+    for index in range(180):
+        now = index * 33 * MS
+        stamp = BASE + now + int(rng.integers(-MS, MS))
+        made.color(message(stamp), now)
+        if index < 60 or rng.random() > 0.3:
+            made.depth(message(stamp), now + 5 * MS)
+        made.poll(now + 10 * MS)
+        if index == 60:
+            made._statistics.snapshot()
+    snapshot = made._statistics.snapshot()
+    assert snapshot.recent['color_without_depth'] > 20
+    assert 'color_between_depth' not in snapshot.recent
+    state = NodeState('tracker', 'active', publishers=1, depth_publishers=1)
+    assert 'found no depth of their time' in judge(state, snapshot)[1]
+
+
+def test_ages_are_counted_from_when_the_node_listens_again() -> None:
+    statistics = Statistics()
+    statistics.listening()
+    assert statistics.snapshot().image_age_s is None
+    statistics.image_came()
+    statistics.depth_came()
+    statistics._image_time -= 60
+    statistics._depth_time -= 60
+    assert statistics.snapshot().image_age_s >= 60
+    statistics.listening()
+    snapshot = statistics.snapshot()
+    assert snapshot.image_age_s < 30
+    assert snapshot.depth_age_s < 30
 
 
 def test_timeline_is_the_stamp_while_stamps_behave() -> None:
@@ -356,6 +513,19 @@ def test_timeline_rises_whatever_the_stamps_do(
     assert (steps <= 60 * 10**9).all()
     assert sum(m.jumped for m in moments) == jumps
     assert sum(m.restarted for m in moments) == restarts
+
+
+def test_restarts_are_counted_over_all_configurations() -> None:
+    statistics = Statistics()
+    publishers = SimpleNamespace(
+        image_wanted=False, publish=lambda _: None, publish_extras=lambda _: None
+    )
+    for loops, sum_of_restarts in ((4, 3), (2, 4)):
+        process = Processor(session()[0], publishers, statistics, time.time_ns, statistics.error)
+        for index in range(loops * 30):
+            image = message(BASE + index % 30 * 33 * MS)
+            process(Capture(image, None, None, index * 33 * MS))
+        assert statistics.snapshot().counts['restarts'] == sum_of_restarts
 
 
 def until(condition: Callable[[], object]) -> None:

@@ -15,6 +15,7 @@ from collections import Counter, deque
 from typing import Any
 
 from rgbd_kcf_tracker.live.processor import Capture
+from rgbd_kcf_tracker.live.settings import NodeParameters
 from rgbd_kcf_tracker.live.statistics import Statistics
 from rgbd_kcf_tracker.live.timeline import StampRepair
 from rgbd_kcf_tracker.recordings.camera_info import Camera
@@ -27,6 +28,9 @@ PATIENT_WAIT_NS = 1_000_000_000
 """Least wait for depth where every pair counts and speed does not."""
 HELD = 5
 """Images that wait for the first intrinsics: a sixth of a second at 30 Hz, tracked at once then."""
+PATIENT_DEPTHS = 60
+"""Depth images that wait for their colour where every pair counts: two seconds at 30 Hz, twice as
+long as colour waits for depth, and a quarter of a gigabyte of 1920x1080."""
 GAPS = 8
 """Steps between depth stamps of which the shortest is the period: one that is lost is none."""
 REMEMBERED = 60
@@ -43,7 +47,7 @@ class DepthFit:
 
     def __init__(self, tolerance_ns: int, wait_ns: int) -> None:
         self._tolerance_ns, self._wait_ns = tolerance_ns, wait_ns
-        self._misses = 0
+        self._misses = self._unused = 0
         self._alone: deque[tuple[int, int]] = deque(maxlen=REMEMBERED)
         self._newest: int | None = None
         self._gaps: deque[int] = deque(maxlen=GAPS)
@@ -71,7 +75,7 @@ class DepthFit:
 
     def paired(self) -> None:
         """A colour image found its depth."""
-        self._misses = 0
+        self._misses = self._unused = 0
 
     def missed(self, stamp_ns: int, arrival_ns: int) -> None:
         """A colour image went out alone."""
@@ -82,20 +86,27 @@ class DepthFit:
 
     def came(self, stamp_ns: int, arrival_ns: int) -> None:
         """A depth image came; where its colour image went out alone, it may have been in time."""
+        self._unused += 1
         if self._newest is not None:
             self._gaps.append(max(stamp_ns - self._newest, 0))
         self._newest = stamp_ns
         late = [a for s, a in self._alone if abs(s - stamp_ns) <= self._tolerance_ns]
         self._late_ns = arrival_ns - late[-1] if late else None
         if self._late_ns is not None and self._late_ns <= self._wait_ns:
-            self._misses = 0
+            self._misses = self._unused = 0
 
     def leaves_out(self, stamp_ns: int) -> bool:
-        """Whether a colour image falls between two depth images, at the rate at which they come."""
-        if self._newest is None or len(self._gaps) < GAPS:
+        """Whether a colour image falls between two depth images, at the rate at which they come.
+
+        So it may only where depth images find the colour images that are theirs.
+        """
+        if self._newest is None or len(self._gaps) < GAPS or self._unused > MISSES:
             return False
         period = min(self._gaps)
-        return self._newest - period < stamp_ns < self._newest + period - self._tolerance_ns
+        # Where the depth image before the newest was lost, its colour image is a period older.
+        jitter = min(self._tolerance_ns // 2, period // 4)
+        after = self._newest - period + jitter
+        return after < stamp_ns < self._newest + period - self._tolerance_ns
 
 
 class Intake:
@@ -107,6 +118,7 @@ class Intake:
         depth_wait_s: how long colour waits for depth.
         camera_info_wait_s: how long the first colour waits for intrinsics.
         patient: every pair counts (recordings, lock-step): wait longer rather than miss a partner.
+        queue_size: pairs that may wait for their turn where every pair counts.
 
     Attributes:
         fit: whether depth finds its colour image.
@@ -120,21 +132,25 @@ class Intake:
         depth_wait_s: float,
         camera_info_wait_s: float,
         patient: bool,
+        queue_size: int = NodeParameters.queue_size,
     ) -> None:
         self._statistics = statistics
         # As recordings are paired where every pair counts: stamps alone decide, not the rate.
         self._pairer: StampPairer[Any, Any] = (
-            patient_pairer(tolerance_s) if patient else StampPairer(tolerance_s)
+            patient_pairer(tolerance_s, PATIENT_DEPTHS) if patient else StampPairer(tolerance_s)
         )
         self._wait_ns = round(depth_wait_s * 1e9)
         self._first_wait_ns = max(self._wait_ns, PATIENT_WAIT_NS) if patient else self._wait_ns
         self.fit = DepthFit(self._pairer.tolerance_ns, self._first_wait_ns)
         self._info_wait_ns = round(camera_info_wait_s * 1e9)
         self._patient = patient
-        self._repair_color, self._repair_depth = StampRepair(), StampRepair()
+        standing: dict[int, int] = {}
+        self._repair_color, self._repair_depth = StampRepair(standing), StampRepair(standing)
         self._counted: Counter[str] = Counter()
         self._arrivals: dict[int, int] = {}
         self._held: deque[Capture] = deque()
+        # With one more they fill the queue: more would push all of each other out of it at once.
+        self._most_held = queue_size - 1 if patient else HELD
         self._hold_from: int | None = None
         self._holding = True
         self._camera: Camera | None = None
@@ -201,19 +217,18 @@ class Intake:
     def _left_out(self, now_ns: int) -> list[Capture]:
         """Colour images that need not wait: depth comes at a lower rate, and has none for them."""
         left = [] if self._patient else [s for s in self._arrivals if self.fit.leaves_out(s)]
-        return self._captures(self._pairer.release(max(left)), now_ns, True) if left else []
+        return self._captures(self._pairer.release(max(left)), now_ns) if left else []
 
-    def _captures(
-        self, pairs: list[Pair[Any, Any]], now_ns: int, left_out: bool = False
-    ) -> list[Capture]:
+    def _captures(self, pairs: list[Pair[Any, Any]], now_ns: int) -> list[Capture]:
         captures = []
         for pair in pairs:
             arrival = self._arrivals.pop(pair.stamp_ns, now_ns)
             if pair.depth is not None:
                 self.fit.paired()
+            elif self.fit.leaves_out(pair.stamp_ns):
+                self._statistics.count('color_between_depth')
             else:
-                if not left_out:
-                    self.fit.missed(pair.stamp_ns, arrival)
+                self.fit.missed(pair.stamp_ns, arrival)
                 self._statistics.count('color_without_depth')
             captures.append(Capture(pair.color, pair.depth, self._camera, now_ns))
         self._forget_lost()
@@ -245,7 +260,7 @@ class Intake:
         if self._hold_from is None:
             self._hold_from = now_ns
         self._held.extend(captures)
-        if self._waited_for_info(now_ns) or (len(self._held) > HELD and not self._patient):
+        if self._waited_for_info(now_ns) or len(self._held) > self._most_held:
             return self._release_held(now_ns)
         return []
 

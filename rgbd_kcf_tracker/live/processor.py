@@ -301,7 +301,7 @@ class Processor:
                 )
         if moment.restarted:
             self._restarts, self._steady = self._restarts + 1, 0
-            self._statistics.set('restarts', self._restarts)
+            self._statistics.count('restarts')
             if self._places is not None:
                 self._places.forget()
             if self.on_restart is not None:

@@ -132,6 +132,8 @@ class Player:
             if attempt < ATTEMPTS - 1:
                 self._repeat()
         stamps = self._answers.give_up()
+        if not stamps:  # the last answer came just now
+            return True
         self._warn(
             f'no answer to {len(stamps)} colour image(s), the first of stamp '
             f'{stamps[0] * 1e-9:.3f} s: going on without'
@@ -145,7 +147,7 @@ class Player:
         topic's publisher would start on a picture without its depth or intrinsics.
         """
         left = self._timeout_s
-        while not self._answers.latencies_s and left > 0:
+        while not self._answers.heard and left > 0:
             if self._answers.wait(min(FIRST_PERIOD_S, left), stop):
                 return True
             if stop.is_set():

@@ -371,9 +371,19 @@ class Session:
     def _named(self, track: Track) -> Track:
         """The track with an id of the session for that of the set."""
         if track.id not in self._ids:
+            self._forget()
             self._last_id += 1
             self._ids[track.id] = self._last_id
         return replace(track, id=self._ids[track.id])
+
+    def _forget(self) -> None:
+        """Drop the ids of whom the set has forgotten: it gives them to nobody again."""
+        metric, asked = self._targets.metric, {self._chosen, *self._added}
+        self._ids = {
+            inner: number
+            for inner, number in self._ids.items()
+            if inner in asked or (metric is not None and metric.person(inner) is not None)
+        }
 
     # -- following --------------------------------------------------------------------------------
 

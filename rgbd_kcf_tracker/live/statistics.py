@@ -45,7 +45,8 @@ class Snapshot:
             :class:`Times`; empty where none was processed, or where stamps and clock have nothing
             to do with each other.
         last_error, error_age_s: the last fault in words, and how long ago.
-        image_age_s: time since the last colour image came, None before the first.
+        image_age_s: time since the last colour image came, or since the node began to listen again
+            after it; None before the first.
         depth_age_s: likewise for depth.
     """
 
@@ -82,10 +83,12 @@ class Statistics:
             with self._lock:
                 self._counts[name] += number
 
-    def set(self, name: str, number: int) -> None:
-        """Take a counter that somebody else keeps."""
+    def listening(self) -> None:
+        """The node begins to hear images: nothing could come for as long as it did not."""
         with self._lock:
-            self._counts[name] = number
+            now = time.monotonic()
+            self._image_time = None if self._image_time is None else now
+            self._depth_time = None if self._depth_time is None else now
 
     def image_came(self) -> None:
         """A colour image was received."""

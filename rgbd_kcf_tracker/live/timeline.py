@@ -81,30 +81,55 @@ class Timeline:
 
 
 class StampRepair:
-    """Stamps of one stream, those that say nothing replaced by the time of arrival."""
+    """Stamps of one stream, those that say nothing replaced by the time of arrival.
 
-    def __init__(self) -> None:
+    A stamp that comes again with another picture stands still: from then on it is the time of its
+    first arrival, and what follows it is as much later as it comes later. Streams that are to be
+    paired must agree on that first arrival, as none of them tells whether it missed some images.
+    Of a clock that was seen to go on each stream counts for itself: there equal stamps do tell what
+    belongs together, however late a stream is.
+
+    Args:
+        standing: when the stamps that stand still came first, shared by the streams of one camera.
+            There is one for each stream at most, as it is dropped when its stream goes on.
+    """
+
+    def __init__(self, standing: dict[int, int]) -> None:
+        self._standing = standing
         self._stamp: int | None = None
-        self._came = self._paced = 0
+        self._goes_on = False
+        self._first = self._came = self._paced = 0
         self._repaired = 0
-        self._arrival = 0
         self._data: Any = None
 
     def __call__(self, stamp_ns: int, arrival_ns: int, data: Any) -> int | None:
         """The stamp to pair by; None where the message is the last one over again."""
-        repaired = stamp_ns
         gap, self._came = arrival_ns - self._came, arrival_ns
         if stamp_ns == self._stamp:
             if _same(data, self._data):
                 self._paced = self._paced + 1 if PACE_NS[0] <= gap < PACE_NS[1] else 0
                 if self._paced <= STILL:
                     return None
-            repaired = self._repaired + max(arrival_ns - self._arrival, 1)
+            first = self._standing.setdefault(stamp_ns, self._first)
+            if not self._goes_on:
+                self._first = first
+            repaired = max(stamp_ns + arrival_ns - self._first, self._repaired + 1)
         else:
-            self._paced = 0
-        self._stamp, self._data = stamp_ns, data
-        self._repaired, self._arrival = repaired, arrival_ns
+            repaired = self._next(stamp_ns, arrival_ns)
+        self._stamp, self._data, self._repaired = stamp_ns, data, repaired
         return repaired
+
+    def _next(self, stamp_ns: int, arrival_ns: int) -> int:
+        """Take up a stamp that is not the last one."""
+        self._paced, self._first, self._goes_on = 0, arrival_ns, False
+        if self._stamp is not None:
+            self._standing.pop(self._stamp, None)
+            self._goes_on = 0 < stamp_ns - self._stamp <= LARGEST_STEP_NS
+        if not self._goes_on:
+            self._first = self._standing.get(stamp_ns, arrival_ns)
+        elif 0 <= self._repaired - stamp_ns < PACE_NS[1]:
+            return self._repaired + 1  # what repeated the stamp before was late by so much
+        return stamp_ns + arrival_ns - self._first
 
 
 def _same(data: Any, other: Any) -> bool:

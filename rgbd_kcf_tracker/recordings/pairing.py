@@ -107,6 +107,7 @@ class StampPairer(Generic[C, D]):
         jump_back_s: a message so much older than the newest is a jump back, not a late message.
         by_rate: give out a pair within the tolerance at once where, at the rates seen so far, no
             nearer partner will come; else stamps alone decide.
+        depth_capacity: depth messages held, where that is another number.
     """
 
     def __init__(
@@ -117,9 +118,11 @@ class StampPairer(Generic[C, D]):
         max_wait_s: float = 0.5,
         jump_back_s: float = JUMP_BACK_S,
         by_rate: bool = True,
+        depth_capacity: int | None = None,
     ) -> None:
         self.tolerance_ns = round(tolerance_s * 1e9)
         self.capacity = max(capacity, 1)
+        self.depth_capacity = self.capacity if depth_capacity is None else max(depth_capacity, 1)
         self.patience_ns = round(patience_s * 1e9)
         self.max_wait_ns = round(max_wait_s * 1e9)
         self.jump_back_ns = round(jump_back_s * 1e9)
@@ -170,7 +173,7 @@ class StampPairer(Generic[C, D]):
         self._depths[stamp_ns] = depth
         self._depth_clock.tick(stamp_ns)
         out += self._decide()
-        while len(self._depths) > self.capacity:
+        while len(self._depths) > self.depth_capacity:
             del self._depths[min(self._depths)]
             self.counts.depth_alone += 1
             self.counts.overflow += 1
@@ -277,13 +280,25 @@ class StampPairer(Generic[C, D]):
             self.counts.depth_alone += 1
 
 
-def patient_pairer(tolerance_s: float = DEFAULT_TOLERANCE_S) -> StampPairer[C, D]:
+def patient_pairer(
+    tolerance_s: float = DEFAULT_TOLERANCE_S, depth_capacity: int | None = None
+) -> StampPairer[C, D]:
     """The pairer for where every pair counts and time does not: recordings, and lock-step.
 
     Stamps alone decide, however late one stream is: the tracker, the replay node that waits for its
     answers, and the reader of recordings must agree on what is a pair.
+
+    Args:
+        tolerance_s: see :class:`StampPairer`.
+        depth_capacity: depth messages held; fewer where they are the images themselves.
     """
-    return StampPairer(tolerance_s, capacity=1000, max_wait_s=60.0, by_rate=False)
+    return StampPairer(
+        tolerance_s,
+        capacity=1000,
+        max_wait_s=60.0,
+        by_rate=False,
+        depth_capacity=depth_capacity,
+    )
 
 
 class _Clock:

@@ -242,7 +242,7 @@ def figures_of(player: Player, answers: Answers, seconds: float) -> dict[str, An
         'color_images': progress.colors,
         'depth_images': progress.depths,
         'pairs': answers.pairs,
-        'answers': len(answers.latencies_s),
+        'answers': answers.heard,
         'unanswered': answers.unanswered,
         'sent_again': progress.repeated,
         'rounds': progress.rounds,

@@ -44,7 +44,6 @@ from rgbd_kcf_tracker.ros.subscriptions import (
     Subscriptions,
 )
 from rgbd_kcf_tracker.ros.transforms import Transforms
-from rgbd_kcf_tracker.track import TrackState
 from rgbd_kcf_tracker.variants import VARIANTS
 
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
@@ -202,6 +201,7 @@ class TrackerNode(LifecycleNode):
                 depth_wait_s=settings.depth_wait,
                 camera_info_wait_s=settings.camera_info_wait,
                 patient=patient,
+                queue_size=settings.queue_size,
             )
             self._worker = Worker(
                 self._processor,
@@ -224,6 +224,7 @@ class TrackerNode(LifecycleNode):
             self._cannot(f'cannot activate: {_first_line(error)}')
             self._stop_listening()
             return FAILURE
+        self.statistics.listening()
         self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
         return super().on_activate(state)
 
@@ -418,7 +419,7 @@ class TrackerNode(LifecycleNode):
             name=name,
             lifecycle=lifecycle,
             variant=session.variant,
-            track=session.track.state if wired is not None else TrackState.IDLE,
+            track=session.track.state,
             topic=wired.topic(COLOR) if wired is not None else '',
             depth_topic=wired.topic(DEPTH) if wired is not None else '',
             publishers=publishers[COLOR],
