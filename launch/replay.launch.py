@@ -17,6 +17,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
 from rgbd_kcf_tracker.live.camera_profiles import NO_CAMERA
+from rgbd_kcf_tracker.live.replay_source import FOLDER_TOPICS
 from rgbd_kcf_tracker.recordings.sequences import is_sequence_folder
 from rgbd_kcf_tracker.ros.launching import (
     CAMERA,
@@ -64,7 +65,14 @@ def start(context: LaunchContext) -> list:
         'lockstep': is_true(values, 'lockstep'),
         'answer_topic': f'{full_name(context, values)}/box',
     }
-    if not folder:
+    if folder:
+        # Its images have these names; the tracker's own are others in a namespace.
+        values |= {
+            'color_topic': FOLDER_TOPICS.color,
+            'depth_topic': FOLDER_TOPICS.depth,
+            'info_topic': FOLDER_TOPICS.info,
+        }
+    else:
         # One camera of several that were recorded; a recording without it says so at once. Depth
         # and CameraInfo of a profile are found beside the colour, where they were recorded.
         named = {name: values[name] for name in ('depth_topic', 'info_topic')}

@@ -17,6 +17,8 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import yaml
 
@@ -253,9 +255,7 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
     NodeParameters(**settings['/**']['ros__parameters'])
 
 
-def test_replay_plays_the_camera_that_the_tracker_hears(
-    launch_modules: None, tmp_path: Path
-) -> None:
+def test_replay_plays_the_camera_that_the_tracker_hears(launch_modules: None) -> None:
     """One of several in the recording, in lock-step with a tracker in a namespace."""
     parameters, passed = start_replay(bag='walk.mcap', camera='kinect2_hd', namespace='left')
     hd = load_cameras(CAMERAS)['kinect2_hd']
@@ -267,12 +267,33 @@ def test_replay_plays_the_camera_that_the_tracker_hears(
     assert (passed['camera'], passed['namespace']) == ('kinect2_hd', 'left')
     named, _ = start_replay(bag='walk.mcap', color_topic='/c', depth_topic='/d', info_topic='/i')
     assert [named[f'{kind}_topic'] for kind in ('color', 'depth', 'info')] == ['/c', '/d', '/i']
-    # A folder of images is played on the names that the tracker has by itself.
+    assert start_replay(bag='walk.mcap')[1]['camera'] == 'kinect2_qhd'
+
+
+@pytest.mark.parametrize('given', [{}, {'namespace': 'left'}, {'ros_namespace': '/robot'}])
+def test_a_folder_is_heard_in_any_namespace(
+    launch_modules: None, tmp_path: Path, given: dict[str, str]
+) -> None:
+    """Replay sends its images on names that no namespace changes."""
+    from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
+    from rgbd_kcf_tracker.live.replay_source import ReplaySource
+
     (tmp_path / 'rgb').mkdir()
-    parameters, passed = start_replay(bag=str(tmp_path))
+    (tmp_path / 'depth').mkdir()
+    cv2.imwrite(str(tmp_path / 'rgb' / '0.png'), np.zeros((48, 64, 3), np.uint8))
+    cv2.imwrite(str(tmp_path / 'depth' / '0.png'), np.full((48, 64), 2000, np.uint16))
+    (tmp_path / 'intrinsics.json').write_text('{"fx": 50, "fy": 50, "cx": 32, "cy": 24}')
+    parameters, passed = start_replay(bag=str(tmp_path), **given)
     assert 'color_topic' not in parameters
     assert passed['camera'] == 'none'
-    assert start_replay(bag='walk.mcap')[1]['camera'] == 'kinect2_qhd'
+    tracker, _ = start_tracker(**passed)
+    with ReplaySource(tmp_path, ReplayParameters()) as source:
+        assert dict(tracker.named['remappings']) == {
+            'color/image': source.color_topic,
+            'depth/image': source.depth_topic,
+            'color/camera_info': source.info_topic,
+        }
+        assert all(topic.name.startswith('/') for topic in source.topics)
 
 
 @pytest.mark.parametrize(

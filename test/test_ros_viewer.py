@@ -38,7 +38,7 @@ from rgbd_kcf_tracker.recordings.evidence_messages import TargetEvidence
 from rgbd_kcf_tracker.recordings.messages import stamp_of
 from rgbd_kcf_tracker.recordings.track_messages import TrackMessages
 from rgbd_kcf_tracker.ros.messages import ROS_TYPES, image_message, stamp_from_ns
-from rgbd_kcf_tracker.ros.viewer_node import ViewerNode
+from rgbd_kcf_tracker.ros.viewer_node import HELD, ViewerNode
 from rgbd_kcf_tracker.view import live_page
 from rgbd_kcf_tracker.view.commands import Command
 from rgbd_kcf_tracker.view.live_page import LivePage, node_parameter
@@ -366,6 +366,32 @@ def test_images_are_shown_as_they_come(
         assert shown[-15:] == [(stamp, True) for stamp in answered][-15:]
 
 
+@pytest.mark.usefixtures('rig')
+def test_images_go_on_at_the_rate_of_the_camera_when_depth_stops(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Those that would wait for it wait once; when it comes again it is shown again."""
+    with made_viewer() as node:
+        node.page.board.watch(lambda: None)
+        shown: list[tuple[int, bool]] = []
+        monkeypatch.setattr(  # due at any time
+            node.page, 'image', lambda frame, stamp: shown.append((stamp, frame.depth is not None))
+        )
+        color, depth, _ = scene(0)
+        for number in range(40):
+            header = Header(stamp=stamp_from_ns(number * 33_000_000))
+            node._on_color(image_message(header, color, 'bgr8'))
+            if number == 9 + HELD:
+                node._show_what_is_due()  # as the timer does
+            if not 10 <= number < 30:
+                node._on_depth(image_message(header, depth, '16UC1'))
+        numbers = [(stamp // 33_000_000, deep) for stamp, deep in shown]
+        # Before the first depth comes nothing waits.
+        assert numbers[:10] == [(0, False), *((n, True) for n in range(1, 10))]
+        assert numbers[10:-10] == [(n, False) for n in range(9 + HELD, 31)]
+        assert numbers[-10:] == [(n, True) for n in range(30, 40)]
+
+
 @pytest.mark.parametrize(('rate', 'expected'), [(10, 10), (20, 20), (60, 30)])
 def test_the_rate_that_is_asked_for_is_reached(
     rate: float, expected: float, monkeypatch: pytest.MonkeyPatch
@@ -464,6 +490,37 @@ def test_states_of_the_answers() -> None:
     # A looping bag: stamps go back, and the last minute begins anew.
     page.answer(500_000_000, [])
     assert len(page.board.take((-1, 0))[2]['entries']) == 1
+
+
+@pytest.mark.parametrize('stamp', [0, 10**18])
+def test_without_a_clock_the_last_minute_is_told_by_arrival(
+    stamp: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or the page would keep all there ever was, and trails would never end."""
+    now_ns = [10**15]
+    monkeypatch.setattr(live_page.time, 'monotonic_ns', lambda: now_ns[0])
+    page = LivePage('tracker', 10)
+    for _ in range(1000):
+        now_ns[0] += 250_000_000
+        page.answer(stamp, [Track(Box(0, 0, 5, 5), TrackState.TRACKING, 0.9, id=3)])
+    page.image(frame_at(stamp), stamp)
+    header = page.board.take((-1, 0))[2]
+    assert [e['t'] for e in header['entries']] == [n / 4 for n in range(759, 1000)]
+    assert header['time'] == 249.75
+
+
+def test_an_image_has_the_time_of_its_answer_or_goes_on_from_the_last() -> None:
+    page = LivePage('tracker', 10)
+
+    def time_of(stamp: int) -> float:
+        page.image(frame_at(stamp), stamp)
+        return float(page.board.take((-1, 0))[2]['time'])
+
+    assert time_of(5 * 10**9) == 0  # nobody has answered yet
+    for stamp in (10**9, 2 * 10**9, 10**9, 2 * 10**9):  # a bag that loops
+        page.answer(stamp, [])
+    assert time_of(2 * 10**9) == 1
+    assert time_of(4 * 10**9) == 3
 
 
 def test_a_hidden_target_has_its_ellipse() -> None:

@@ -231,6 +231,17 @@ def test_a_recording_is_sought_stepped_and_played(chromium: Browser, served: Ser
     assert page.errors == []
 
 
+def test_the_last_minute_has_an_end_whatever_its_times(chromium: Browser, served: Served) -> None:
+    page = opened(chromium, served)
+    page.value(
+        'page.entries = Array.from({length: 7000}, () => ({t: 0, targets: []})); '
+        "page.drawn = 0; send({do: 'step', by: 1})"
+    )
+    page.until('page.drawn > 0 && page.shown.frame > 0')
+    assert page.value('page.entries.length') == 6000
+    assert page.value('page.entries.at(-1).frame') == page.value('page.shown.frame')
+
+
 def test_parameters_have_their_ranges_and_are_sent(chromium: Browser, served: Served) -> None:
     page = opened(chromium, served)
     page.value("document.querySelector('details').open = true")

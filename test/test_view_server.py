@@ -74,6 +74,16 @@ def run(action: Callable[[aiohttp.ClientSession], Awaitable[Any]]) -> Any:
     return asyncio.run(main())
 
 
+def within(seconds: float, condition: Callable[[], Any]) -> bool:
+    """Whether a condition comes to hold in that time."""
+    end = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.02)
+    return True
+
+
 def header_of(packet: bytes) -> dict[str, Any]:
     (length,) = struct.unpack_from('<I', packet)
     return dict(json.loads(packet[4 : 4 + length]))
@@ -283,7 +293,7 @@ def test_nothing_is_shown_before_the_token_is_given(server: Server, stub: Stub) 
         ) as answer:
             assert answer.status == 200
             assert '<canvas' in await answer.text()
-        (cookie,) = (c for c in session.cookie_jar if c.key == COOKIE)
+        (cookie,) = (c for c in session.cookie_jar if c.key.startswith(COOKIE))
         assert cookie['httponly']
         assert cookie['samesite'] == 'Strict'
         assert TOKEN not in cookie.value
@@ -326,8 +336,9 @@ def test_a_login_too_large_is_refused(server: Server) -> None:
 def answer_to(server: Server, request: bytes) -> bytes:
     """The first line of what comes back, or b'' where the connection is closed."""
     host, _, port = server.url.split('/')[2].rpartition(':')
+    place = f'{host}:{port}'.encode()
     with socket.create_connection((host, int(port)), timeout=20) as connection:
-        connection.sendall(request.replace(b'HERE', f'{host}:{port}'.encode()))
+        connection.sendall(request.replace(b'HERE', place).replace(b'PORT', port.encode()))
         with connection.makefile('rb') as lines:
             return lines.readline()
 
@@ -340,9 +351,10 @@ FORM = b'POST /login HTTP/1.1\r\nHost: HERE\r\nOrigin: http://HERE\r\n'
     'request_',
     [
         b'GET / HTTP/1.1\r\nHost: [::1\r\n\r\n',
+        b'GET / HTTP/1.1\r\nHost: 127.0.0.1:99999\r\n\r\n',
         b'GET / HTTP/1.1\r\nHost: HERE\r\nOrigin: http://[::1\r\n\r\n',
         b'GET /boxes.csv HTTP/1.1\r\nHost: HERE\r\nOrigin: http://HERE/\r\n'
-        b'Cookie: rgbd_kcf_view=\xff\xfe\r\n\r\n',
+        b'Cookie: rgbd_kcf_view_PORT=\xff\xfe\r\n\r\n',
         FORM + b'Content-Type: multipart/form-data\r\nContent-Length: 5\r\n\r\nhello',
         FORM + b'Content-Type: multipart/form-data; boundary=x\r\nContent-Length: 5\r\n\r\nhello',
         FORM + b'Content-Type: application/x-www-form-urlencoded; charset=none\r\n'
@@ -364,6 +376,62 @@ def test_a_form_that_never_ends_holds_no_connection(
     monkeypatch.setattr(module, 'FORM_S', 0.1)
     kind = b'Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 1000\r\n\r\n'
     assert b' 408 ' in answer_to(server, FORM + kind + b'token=')
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+@pytest.mark.parametrize(
+    'words',
+    [b'', b'GET / HTTP/1.1\r\nX-Half: ', b'GET /page.css HTTP/1.1\r\nHost: HERE\r\n\r\n' * 2000],
+    ids=['silent', 'half a header', 'reads no answer'],
+)
+def test_a_stranger_holds_no_connection(
+    server: Server, words: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many as files may be open would keep everybody else out."""
+    monkeypatch.setattr(module, 'QUIET_S', 0.5)
+    host, _, port = server.url.split('/')[2].partition(':')
+    with socket.create_connection((host, int(port)), 20) as stranger:
+        stranger.sendall(words)
+        assert within(5, lambda: server._runner.server.connections)
+        assert within(5, lambda: not server._runner.server.connections)
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+def test_who_gave_the_token_stays(
+    server: Server, stub: Stub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, 'QUIET_S', 0.1)
+
+    async def ask(session: aiohttp.ClientSession) -> None:
+        named = {'Origin': origin(server)}
+        await session.post(server.url + 'login', data={'token': TOKEN}, headers=named)
+        looking = await session.ws_connect(server.url + 'socket', headers=named)
+        await looking.receive_json()
+        await asyncio.sleep(2.5 * module.ROUND_S)
+        stub.board.show({'frame': 7}, {})
+        assert header_of((await looking.receive()).data)['frame'] == 7
+
+    run(ask)
+
+
+@pytest.mark.parametrize('server', [TOKEN], indirect=True)
+def test_two_viewers_on_one_host_log_nobody_out(server: Server) -> None:
+    async def ask(session: aiohttp.ClientSession) -> None:
+        for at, token in ((server, TOKEN), (other, 'another horse')):
+            named = {'Origin': origin(at)}
+            await session.post(at.url + 'login', data={'token': token}, headers=named)
+        for at in (server, other):
+            async with session.get(at.url + 'boxes.csv') as answer:
+                assert answer.status == 200
+        # Of two tunnels to the same port elsewhere the browser's own ports tell.
+        named = {'Host': 'localhost:9001', 'Origin': 'http://localhost:9001'}
+        async with session.post(
+            server.url + 'login', data={'token': TOKEN}, headers=named, allow_redirects=False
+        ) as answer:
+            assert list(answer.cookies) == [f'{COOKIE}_9001']
+
+    with module.serving(Stub(), '127.0.0.1', 0, 'another horse') as other:
+        run(ask)
 
 
 def test_the_end_waits_for_no_browser_that_sleeps(server: Server) -> None:

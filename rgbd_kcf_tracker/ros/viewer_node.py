@@ -100,6 +100,8 @@ class ViewerNode(Node):
         self._looked_at: list[Any] = []
         self._depths: dict[int, Any] = {}
         self._colors: dict[int, Any] = {}
+        # Those that waited for their depth in vain: while there are any, no other waits.
+        self._alone: dict[int, Any] = {}
         self._camera: Camera | None = None
         self._unwatched = 0.0
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -135,11 +137,15 @@ class ViewerNode(Node):
 
     def _on_color(self, message: Any) -> None:
         self._hold(self._colors, message)
-        if not self._depths:  # else its own comes, while that of the one before may be near enough
+        # Else its own comes, while that of the one before may be near enough.
+        if self._alone or not self._depths:
             self._show_what_is_due()
 
     def _on_depth(self, message: Any) -> None:
         self._hold(self._depths, message)
+        missed = [s for s in self._alone if abs(s - stamp_of(message)) <= PAIR_NS]
+        if missed:  # it comes again: that image is shown once more, and the next ones wait
+            self._colors = {missed[-1]: self._alone[missed[-1]]} | self._colors
         self._show_what_is_due()
 
     @staticmethod
@@ -178,8 +184,8 @@ class ViewerNode(Node):
             for made in self._looked_at:
                 self.destroy_subscription(made)
             self._looked_at.clear()
-            self._colors.clear()
-            self._depths.clear()
+            for held in (self._colors, self._depths, self._alone):
+                held.clear()
 
     def _listen(self) -> None:
         qos = QoSProfile(
@@ -210,9 +216,13 @@ class ViewerNode(Node):
             return  # its answer may still come
         stamp = max(answered or paired or self._colors)
         depth = self._depth_of(stamp)
-        if depth is None and self._depths and len(self._colors) < HELD:
-            return  # its depth may still come
         color = self._colors[stamp]
+        if depth is not None:
+            self._alone.clear()
+        elif self._depths:
+            if not self._alone and len(self._colors) < HELD:
+                return  # its depth may still come
+            self._hold(self._alone, color)
         for held in list(self._colors):  # those that came later may be answered for the next moment
             del self._colors[held]
             if held == stamp:

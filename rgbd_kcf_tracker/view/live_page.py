@@ -84,9 +84,14 @@ class ViewerParameters(Parameters):
 
 @dataclass(slots=True)
 class _Answer:
-    """What the node said of a frame: who is where, and, where it came, why."""
+    """What the node said of a frame: who is where, and, where it came, why.
+
+    Attributes:
+        time_ns: of the frame, from the first of the last minute on; it rises whatever stamps do.
+    """
 
     tracks: dict[int, Track]
+    time_ns: int = 0
     evidence: Mapping[int, TargetEvidence] | None = None
 
 
@@ -129,7 +134,8 @@ class LivePage:
         self._looks: OrderedDict[int, _Looks] = OrderedDict()
         self._rows: deque[tuple[int, int, Track]] = deque(maxlen=_MOST_ROWS)
         self._count = 0
-        self._origin_ns: int | None = None
+        self._origin_ns: int | None = None  # in the timeline's time
+        self._ahead_ns: int | None = None  # of its stamp, the time of the last answer
         self._timeline = Timeline()
         self._frame: Frame | None = None
         self._figures: dict[str, str] = {}
@@ -229,11 +235,16 @@ class LivePage:
         """``~/state``: the answer to a frame, the chosen target first."""
         self._settle()
         before = self._latest().tracks
-        restarted = self._timeline.advance(stamp_ns, time.monotonic_ns()).restarted
-        if restarted:  # the same stamps come again, with other answers
+        instant = self._timeline.advance(stamp_ns, time.monotonic_ns())
+        if instant.restarted:  # the same stamps come again, with other answers
             self._answers.clear()
+        if self._origin_ns is None or instant.restarted:
+            self._origin_ns = instant.time_ns
+            self.board.rewind([])
+        time_ns = instant.time_ns - self._origin_ns
+        self._ahead_ns = time_ns - stamp_ns
         found = {track.id: track for track in tracks if track.state is not TrackState.IDLE}
-        self._answers[stamp_ns] = _Answer(found)
+        self._answers[stamp_ns] = _Answer(found, time_ns)
         while len(self._answers) > _ANSWERS:
             self._answers.popitem(last=False)
         now = time.monotonic()
@@ -246,13 +257,10 @@ class LivePage:
                 looks.known = tuple(known for known in looks.known if known.view is not None)
         while len(self._looks) > _MOST_PEOPLE:
             self._looks.popitem(last=False)
-        if self._origin_ns is None or restarted or stamp_ns < self._origin_ns:
-            self._origin_ns = stamp_ns
-            self.board.rewind([])
         self._count += 1
         self._rows.extend((self._count - 1, stamp_ns, track) for track in found.values())
         entry: dict[str, Any] = {
-            't': round((stamp_ns - self._origin_ns) * 1e-9, 3),
+            't': round(time_ns * 1e-9, 3),
             **{stage: _number(self._figures.get(f'{stage}_median_ms')) for stage in STAGES},
         }
         if self._lately:
@@ -335,11 +343,14 @@ class LivePage:
             key: self._names.get(key, f'{"target" if key in chosen else "person"} {key}')
             for key in tracks
         }
-        origin = stamp_ns if self._origin_ns is None else self._origin_ns
+        if stamp_ns in self._answers:
+            time_ns = self._answers[stamp_ns].time_ns
+        else:
+            time_ns = 0 if self._ahead_ns is None else stamp_ns + self._ahead_ns
         variant = self.variant
         prefix = f'{variant}.'
         status = {
-            'time': round((stamp_ns - origin) * 1e-9, 3),
+            'time': round(time_ns * 1e-9, 3),
             'playing': True,
             'silent': silent,
             'everyone': self.everyone,

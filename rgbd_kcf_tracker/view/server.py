@@ -17,6 +17,7 @@ import errno
 import hmac
 import ipaddress
 import logging
+import math
 import secrets
 import socket
 import threading
@@ -40,6 +41,11 @@ WRONG_TOKEN_S = 1.0
 """Wait after a wrong token, in which no other is looked at: guessing is slow for everybody."""
 FORM_S = 5.0
 """Longest wait for the rest of a form: who sends none of it would hold a connection for ever."""
+QUIET_S = 15.0
+"""Longest life of a connection since it was opened or asked something, before the token is given:
+anybody who reaches the port could hold as many as files may be open. Twice what a login takes."""
+ROUND_S = 1.0
+"""Between two looks for such connections."""
 COMMANDS_S = 60
 """Requests that one browser may make each second; beyond, its socket is closed."""
 ACK_S = 10.0
@@ -50,6 +56,7 @@ for what is being answered."""
 COMPLAINT_S = 60.0
 """Between two words about the same trouble in the log."""
 COOKIE = 'rgbd_kcf_view'
+"""Begins the name of the cookie; see :func:`_cookie`."""
 STATIC = ('page.css', 'page.js', 'draw.js', 'room.js')
 
 _HEADERS = {
@@ -125,6 +132,7 @@ class Server:
         self._loop = asyncio.new_event_loop()
         self._thread: threading.Thread | None = None
         self._sockets: set[web.WebSocketResponse] = set()
+        self._until: dict[web.RequestHandler, float] = {}  # when each connection is to end
         self._wrong = asyncio.Lock()
         self.url = ''
 
@@ -182,10 +190,22 @@ class Server:
                 *(web.get(f'/{name}', self._static) for name in STATIC),
             ]
         )
-        # A browser that only opens connections must not hold them for ever.
+        # Between two requests; for the first one, older versions of aiohttp wait for ever.
         self._runner = web.AppRunner(app, access_log=None, keepalive_timeout=15)
         await self._runner.setup()
+        self._rounds = self._loop.create_task(self._let_strangers_go(self._runner))
         await web.SockSite(self._runner, listening).start()
+
+    async def _let_strangers_go(self, runner: web.AppRunner) -> None:
+        """End the connections whose time is over, for as long as the server lives."""
+        while runner.server is not None:
+            now = self._loop.time()
+            # Of those that have ended nothing is kept.
+            self._until = {c: self._until.get(c, now + QUIET_S) for c in runner.server.connections}
+            for connection, until in self._until.items():
+                if now >= until and connection.transport is not None:
+                    connection.transport.abort()
+            await asyncio.sleep(ROUND_S)
 
     async def _close(self) -> None:
         closing = asyncio.gather(*(c.close() for c in self._sockets), return_exceptions=True)
@@ -208,9 +228,11 @@ class Server:
     async def _guard(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Every request passes here before anything else is done with it."""
         refusal = self._refusal(request)
+        known = refusal is None and self._known(request)
+        self._until[request.protocol] = math.inf if known else self._loop.time() + QUIET_S
         if refusal is not None:
             response: web.StreamResponse = web.Response(status=403, text=refusal)
-        elif not self._known(request) and request.path != '/login':
+        elif not known and request.path != '/login':
             # Styles are no secret, and the form should not be ugly.
             if request.path == '/page.css':
                 response = await handler(request)
@@ -245,7 +267,7 @@ class Server:
     def _known(self, request: web.Request) -> bool:
         if not self._token:
             return True
-        return _equal(request.cookies.get(COOKIE, ''), self._session)
+        return _equal(request.cookies.get(_cookie(request), ''), self._session)
 
     async def _login(self, request: web.Request) -> web.StreamResponse:
         try:
@@ -262,7 +284,7 @@ class Server:
         if not self._token or _equal(said, self._token):
             response = web.Response(status=303, headers={'Location': '/'})
             response.set_cookie(
-                COOKIE, self._session, httponly=True, samesite='Strict', path='/',
+                _cookie(request), self._session, httponly=True, samesite='Strict', path='/',
                 secure=request.secure,
             )  # fmt: skip
             return response
@@ -374,10 +396,18 @@ def _parts(url: str) -> SplitResult:
     """The parts of an address that somebody else wrote; none where it is no address."""
     try:
         parts = urlsplit(url)
-        _ = parts.hostname, parts.netloc
+        _ = parts.hostname, parts.netloc, parts.port
     except ValueError:
         return urlsplit('')
     return parts
+
+
+def _cookie(request: web.Request) -> str:
+    """The cookie's name, with the port that the browser asked.
+
+    Cookies ignore ports: two viewers on one host, or behind two tunnels, would share one.
+    """
+    return f'{COOKIE}_{_parts("//" + request.headers.get("Host", "")).port}'
 
 
 class _Complaints:

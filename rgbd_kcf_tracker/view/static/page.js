@@ -6,6 +6,7 @@
 
 const $ = id => document.getElementById(id);
 const STATE_WORDS = {tracking: 'tracking', occluded: 'hidden', lost: 'lost', idle: 'no target'};
+const MOST_ENTRIES = 6000;  // as the server keeps: a minute at 100 Hz
 const stored = $('stored');
 const page = {
   hello: null, shown: null, entries: [], trails: new Map(), points: null, bitmaps: {}, drag: null,
@@ -48,7 +49,7 @@ async function show(buffer) {
   if (shown.anew) page.entries = [];
   page.entries.push(...shown.entries);
   const last = page.entries.length ? page.entries[page.entries.length - 1].t : 0;
-  page.entries = page.entries.filter(e => e.t >= last - 60);
+  page.entries = page.entries.filter(e => e.t >= last - 60).slice(-MOST_ENTRIES);
   page.shown = shown;
   page.last = performance.now();
   if (page.waiting) { page.waiting = false; $('banner').hidden = true; }
