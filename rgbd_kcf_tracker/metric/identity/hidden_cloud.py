@@ -78,10 +78,12 @@ class HiddenCloud:
         """Go on by ``dt`` seconds."""
         keep = np.exp(-dt / TURN_TIME)
         noise = ROAM * np.sqrt(1 - keep**2)
-        self._velocities *= keep
-        self._velocities += noise * self._rng.standard_normal(self._velocities.shape)
+        turned = noise * self._rng.standard_normal(self._velocities.shape)
         ahead = self._positions[:, 2] >= NEAREST
-        self._positions += self._velocities * dt
+        # Exactly as far as what is forgotten at that rate goes, however long the step.
+        self._positions += TURN_TIME * (1 - keep) * self._velocities + turned * (dt / 2)
+        self._velocities *= keep
+        self._velocities += turned
         z = self._positions[:, 2]
         np.maximum(z, NEAREST, out=z, where=ahead)
 
