@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_info
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.batch import transport
-from rgbd_kcf_tracker.batch.content import MISSING, files_digest
+from rgbd_kcf_tracker.batch.content import files_digest
 from rgbd_kcf_tracker.batch.environment import Environment, code_files, environment
 from rgbd_kcf_tracker.batch.loop import run_all
 from rgbd_kcf_tracker.batch.shards import Shard
@@ -312,14 +312,37 @@ def test_a_missing_file_is_part_of_the_digest(tmp_path: Path):
     assert len({missing, files_digest([tmp_path / 'truth.txt']), files_digest([])}) == 3
 
 
-def test_what_cannot_be_read_has_no_digest(recorded: Path, monkeypatch: pytest.MonkeyPatch):
+def test_one_file_that_cannot_be_read_hides_no_change_of_others(
+    recorded: Path, monkeypatch: pytest.MonkeyPatch
+):
     from rgbd_kcf_tracker.batch import content
 
-    def fail(path: Path) -> str:
-        raise PermissionError(13, 'Permission denied', str(path))
+    whole, real = files_digest([recorded]), content._file_digest
 
+    def fail(path: Path) -> str:
+        if path.name == '1.png':
+            raise PermissionError(13, 'Permission denied', str(path))
+        return real(path)
+
+    monkeypatch.setattr(content, '_SETTLED_S', -1.0)
+    with monkeypatch.context() as patch:
+        patch.setattr(content, '_file_digest', fail)
+        before = files_digest([recorded])
+        assert before != whole
+    assert files_digest([recorded]) == whole, 'nothing was kept of what could not be read'
     monkeypatch.setattr(content, '_file_digest', fail)
-    assert files_digest([recorded]) == MISSING
+    (recorded / 'groundtruth.txt').write_text('1,2,3,5\n')
+    assert files_digest([recorded]) != before
+
+
+def test_the_log_of_a_database_is_part_of_its_digest(tmp_path: Path):
+    bag = tmp_path / 'walk.db3'
+    bag.write_bytes(b'SQLite format 3')
+    before = files_digest([bag])
+    (tmp_path / 'walk.db3-wal').write_bytes(b'more frames')
+    longer = files_digest([bag])
+    (tmp_path / 'walk.db3-wal').write_bytes(b'other frames')
+    assert len({before, longer, files_digest([bag])}) == 3
 
 
 # --- code and libraries

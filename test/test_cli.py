@@ -370,7 +370,10 @@ def test_convert_of_a_bag_refuses_options_that_choose_in_it(
     source, copy = tmp_path / 'a.mcap', tmp_path / 'b.mcap'
     assert main(['simulate', str(source), '--size', '160x90', '--duration', '0.2']) == 0
     capsys.readouterr()
-    for option in (['--depth-topic', 'none'], ['--color-topic', '/other'], ['--max-pixels', '9']):
+    for option in (
+        ['--depth-topic', 'none'], ['--color-topic', '/other'], ['--max-pixels', '9'],
+        ['--camera', 'kinect2_hd'],
+    ):  # fmt: skip
         assert main(['convert', str(source), str(copy), *option]) == 2
         assert f'{option[0]} means nothing for a bag' in capsys.readouterr().err
         assert not copy.exists()
@@ -657,7 +660,7 @@ def test_real_recordings_give_the_same_boxes_from_folder_and_bag(
     [
         ['evaluate', 'sim:normal', '--size', '\u00b2x3'],
         ['evaluate', 'sim:normal', '--size', f'{"9" * 5000}x540'],
-        ['evaluate', 'sim:normal', '--eao-lengths', '\u00b2-3'],
+        ['evaluate', 'sim:normal', '--short-term', '--eao-lengths', '\u00b2-3'],
         ['simulate', 'x.mcap', '--size', f'{"9" * 5000}x540'],
     ],
 )

@@ -33,7 +33,7 @@ from rgbd_kcf_tracker.errors import DatasetError, WorkersError
 from rgbd_kcf_tracker.evaluation import runner
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets import Opened, Sequence, open_dataset
-from rgbd_kcf_tracker.evaluation.jobs import RunOptions
+from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
 from rgbd_kcf_tracker.evaluation.parts import Whole, join, write_part
 from rgbd_kcf_tracker.evaluation.report import Heading
 
@@ -116,6 +116,28 @@ def test_parts_joined_give_the_same_bytes(serial: Path, tmp_path: Path, capsys):
     assert '1 of 3 parts are missing: run --shard 2/3' in capsys.readouterr().err
     assert main(['evaluate', '--merge', *parts, '--report', str(tmp_path / 'r')]) == 0
     assert_same(serial, tmp_path / 'r')
+
+
+def test_what_a_part_lacks_is_named_where_parts_are_joined(tmp_path: Path, capsys):
+    words = [*SCENES, '--jobs', '1', '--report', str(tmp_path / 'r')]
+    for part in ('1/2', '2/2'):
+        assert main(['evaluate', *words, '--shard', part]) == 0
+    (tmp_path / 'r' / 'results' / 'rgbd' / 'normal_2.csv').unlink()
+    join_it = ['evaluate', '--merge', str(tmp_path / 'r'), '--report', str(tmp_path / 'r')]
+    capsys.readouterr()
+    assert main(join_it) == 2
+    said = '1 runs are missing: normal/2 (rgbd): run --shard 2/2 again'
+    assert said in capsys.readouterr().err
+    assert main(['evaluate', *words, '--shard', '2/2']) == 0
+    assert main(join_it) == 0
+
+
+def test_a_run_that_failed_is_not_missing_where_parts_are_joined(tmp_path: Path):
+    sequences = [Sequence(name, 's', 'folder', broken, name) for name in ('a', 'b')]
+    lost = [Failure('a', '', 'gone'), Failure('b', 'kcf', 'gone')]
+    own = Whole(sequences, [KCF], RunOptions(code='x'), Heading(('data',)), lost)
+    write_part(tmp_path / '1', Shard(1, 1), sequences, own)
+    assert join([tmp_path / '1'], tmp_path / 'r').failures == lost
 
 
 def test_a_report_that_is_joined_writes_into_no_part_by_a_link(tmp_path: Path, capsys):

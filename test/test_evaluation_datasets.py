@@ -100,6 +100,12 @@ def test_our_layout_starts_where_the_target_is_clearly_in_view(own: Path):
     assert samples[0].body == Box(1, 2, 10, 30)
 
 
+@pytest.mark.parametrize('share', ['-0.1', '1.01', '1000', 'nan'])
+def test_a_visible_share_that_cannot_be_is_named(own: Path, share: str):
+    (own / 'visible.txt').write_text(f'1\n{share}\n0\n1\n')
+    assert f'visible.txt, line 2: {share!r}: write the visible share, 0 to 1' in error_of(own)
+
+
 def test_a_sequence_is_another_one_when_its_files_change(own: Path):
     digests = []
     for change in (lambda: None, lambda: write_images(own / 'rgb', ['000005.png']),
@@ -237,6 +243,15 @@ def test_vot_regions():
             parse_region(bad)
 
 
+@pytest.mark.parametrize('fps', ['0', 'nan', '-30', 'inf', '1e-9', 'many'])
+def test_a_vot_rate_that_cannot_be_is_named(tmp_path: Path, fps: str):
+    path = tmp_path / 'cup01'
+    write_images(path / 'color', numbered(2, 8, '.jpg'))
+    (path / 'groundtruth.txt').write_text('5,6,10,20\n' * 2)
+    (path / 'sequence').write_text(f'fps={fps}\n')
+    assert f'{path / "sequence"}: fps is {fps!r}: give a number from 0.001' in error_of(path)
+
+
 def test_vot_depth_images_missing(tmp_path: Path):
     path = tmp_path / 'cup01'
     write_images(path / 'color', numbered(3, 8, '.jpg'))
@@ -318,6 +333,14 @@ def test_princeton_frames_mat_broken(princeton: Path):
     assert 'frames.mat cannot be read' in error_of(princeton)
     savemat(princeton / 'frames.mat', {'frames': {'length': 3}})
     assert 'imageTimestamp' in error_of(princeton)
+
+
+def test_a_princeton_stamp_that_is_no_number_is_told(princeton: Path):
+    savemat(princeton / 'frames.mat', {'frames': {
+        'imageTimestamp': [1000, np.nan, 67000], 'imageFrameID': [1, 2, 4],
+        'depthTimestamp': [900, 33900, 66900], 'depthFrameID': [2, 3, 5],
+    }})  # fmt: skip
+    assert 'a stamp or number of a frame is none' in error_of(princeton)
 
 
 def test_our_layout_with_lines_and_frames_of_different_number(own: Path):
@@ -498,6 +521,30 @@ def test_a_scene_measures_the_same_as_bag_and_as_folder(tmp_path: Path):
         assert np.array_equal(one.frame.color, three.frame.color)
         np.testing.assert_allclose(one.frame.depth, two.frame.depth, atol=0.001)
         np.testing.assert_allclose(one.frame.depth, three.frame.depth, atol=0.001)
+
+
+def test_files_of_one_bag_are_one_sequence_and_bags_of_other_names_are_each_one(tmp_path: Path):
+    folder = tmp_path / 'walk'
+    folder.mkdir()
+    for name in ('walk_0.mcap', 'walk_1.mcap'):
+        (folder / name).write_bytes(b'\x89MCAP0\r\n')
+    (sequence,) = open_dataset(str(folder))
+    assert (sequence.name, sequence.path) == ('walk', folder)
+    assert [s.name for s in open_dataset(str(tmp_path))] == ['walk']
+    (folder / 'other.mcap').write_bytes(b'\x89MCAP0\r\n')
+    assert [s.name for s in open_dataset(str(folder))] == ['other', 'walk_0', 'walk_1']
+
+
+def test_a_bag_that_is_named_goes_by_its_first_bytes(tmp_path: Path):
+    bag = tmp_path / 'walk.of.monday'
+    bag.write_bytes(b'\x89MCAP0\r\n')
+    (sequence,) = open_dataset(str(bag))
+    assert (sequence.path, sequence.kind) == (bag, 'recording')
+    with pytest.raises(DatasetError, match='holds no sequence'):
+        open_dataset(str(tmp_path))
+    bag.write_bytes(b'words')
+    with pytest.raises(DatasetError, match='holds no sequence'):
+        open_dataset(str(bag))
 
 
 def test_real_people_walking_past_each_other(shared_data: Path):

@@ -497,6 +497,16 @@ def test_a_run_is_not_repeated_and_others_are_added(pair: Path, tmp_path: Path, 
     assert first['MOTA %'] == second['MOTA %'] == '100'
 
 
+def test_a_run_whose_bodies_are_gone_is_made_again(pair: Path, tmp_path: Path, fake):
+    write(pair / 'body_7.txt', '0,0,10,40\n' * 8)
+    report = tmp_path / 'report'
+    assert evaluate(pair, '--everyone', '--report', report) == 0
+    (bodies,) = (report / 'truth' / 'everyone').glob('*.body.txt')
+    bodies.unlink()
+    assert evaluate(pair, '--everyone', '--report', report) == 0
+    assert bodies.is_file()
+
+
 def test_a_truth_that_was_edited_and_is_as_before_is_the_one_measured_against(
     pair: Path, tmp_path: Path, fake
 ):
@@ -541,9 +551,19 @@ def test_what_fails_is_listed_and_the_rest_measured(pair: Path, tmp_path: Path, 
     [
         (['--short-term'], '--short-term means nothing with --everyone'),
         (['--export', 'vot'], '--export means nothing with --everyone'),
+        (['--kind', 'otb'], '--kind means nothing with --everyone'),
         (['--variants', 'opencv:mil'], 'opencv:mil follows one target'),
     ],
 )
 def test_what_does_not_go_with_everyone(words, message, pair: Path, tmp_path: Path, fake, capsys):
     assert evaluate(pair, '--everyone', *words, '--report', tmp_path / 'report') == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_variant_that_cannot_follow_everyone_is_told_before_anything_is_run(
+    pair: Path, tmp_path: Path, capsys
+):
+    words = ('--variants', 'metric,kcf', '--report', tmp_path / 'report')
+    assert evaluate(pair, '--everyone', *words) == 2
+    assert 'variant kcf follows chosen targets only' in capsys.readouterr().err
+    assert not (tmp_path / 'report').exists()

@@ -11,6 +11,7 @@ import json
 import math
 import re
 import shutil
+import zipfile
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
@@ -133,6 +134,22 @@ def test_table_4_1_splits_agree_with_the_overall(measured: Measured):
     assert cells(table, 'number of sequences')['human'] == 1
 
 
+def test_a_sequence_without_a_frame_that_counts_is_left_out_of_table_4_1(
+    results: list[Result],
+):
+    alone = [dataclasses.replace(r, sequence='c', judged=np.zeros(3, bool)) for r in results[2:]]
+    infos = {
+        'a': Info('a', 'occlusion', 'sim', HIDDEN),
+        'b': Info('b', 'motion', 'sim', FAST),
+        'c': Info('c', 'motion', 'sim', FAST),
+    }
+    table = thesis_tables.table_4_1(Measured([*results, *alone], infos))
+    assert cells(table, 'kcf')['not occluded'] == pytest.approx(100)
+    assert cells(table, 'kcf')['all'] == pytest.approx(62.5)
+    number = cells(table, 'number of sequences')
+    assert (number['not occluded'], number['all']) == (1, 2)
+
+
 def test_tables_4_5_5_1_and_5_2(measured: Measured):
     ap = cells(thesis_tables.table_4_5(measured), 'kcf')['AP %']
     assert ap == pytest.approx(100 * (1 / 4 + 1) / 2)
@@ -194,6 +211,14 @@ def test_otb_table_counts_the_first_frame_as_the_benchmark_does(results: list[Re
     )
 
 
+def test_a_tracker_without_an_otb_sequence_has_no_otb_numbers(results: list[Result]):
+    infos = {'a': Info('a', 'otb', 'otb', HIDDEN), 'b': Info('b', 's', 'sim', HIDDEN)}
+    table = score_tables.otb_protocol(Measured(results[1:], infos))
+    assert cells(table, 'kcf') == {
+        'tracker': 'kcf', 'sequences': 0, 'precision at 20 px': None, 'AUC': None
+    }  # fmt: skip
+
+
 def test_short_term_table():
     run = vot.ShortTermRun(np.array([1, *[3] * 19]), np.array([1.0, *[0.6] * 19]))
     table = thesis_tables.short_term({('kcf', 'a'): run, ('kcf', 'b'): run})
@@ -204,6 +229,17 @@ def test_short_term_table():
 
 def test_scores_that_never_vary_have_no_reliability(measured: Measured):
     table, found = score_tables.reliability(measured)
+    assert found == {}
+    assert cells(table, 'kcf')['Brier'] is None
+
+
+def test_scores_that_are_infinite_never_vary(results: list[Result]):
+    endless = [
+        result(r.tracker, r.sequence, [TRUTH] * 3, [TRUTH] * 3, math.inf) for r in results[2:]
+    ]
+    table, found = score_tables.reliability(
+        Measured(endless, {'b': Info('b', 'motion', 'sim', FAST)})
+    )
     assert found == {}
     assert cells(table, 'kcf')['Brier'] is None
 
@@ -256,6 +292,12 @@ def test_tables_as_csv_text_and_markdown():
     assert table.markdown().splitlines()[1] == '| --- | ---: |'
     two = Table('k', 't', ('tracker', 'a'), (('x', 1.0), ('y', 2.0), ('thesis', 9.0)), best='max')
     assert [two.is_best(row, 1) for row in two.rows] == [False, True, False]
+    piped = Table('k', 't', ('tracker', 'a|b'), (('x|y', 1.0),))
+    assert piped.markdown().splitlines() == [
+        '| tracker | a\\|b |',
+        '| --- | ---: |',
+        '| x\\|y | 1.0 |',
+    ]
     nothing = Table('k', 't', ('tracker', 'a'), (('x', math.nan), ('y', 2.0)), best='max')
     assert nothing.csv() == 'tracker,a\nx,\ny,2\n'
     assert nothing.cells()[1] == ['x', '-']
@@ -294,6 +336,21 @@ def test_strips_choose_frames_spread_out_and_interesting():
     assert chosen[-1] == 98
     assert sum(40 <= i < 50 for i in chosen) >= 3
     assert strips.choose(np.arange(3), wrong) == [0, 1, 2]
+
+
+def test_a_strip_fits_pictures_of_several_sizes_and_truth_far_outside(tmp_path: Path):
+    with zipfile.ZipFile(tmp_path / 'p.zip', 'w') as file:
+        for number, shape in enumerate([(60, 80), (40, 120), (30, 40)]):
+            picture = np.full((*shape, 3), 90, np.uint8)
+            file.writestr(f'{number}.jpg', cv2.imencode('.jpg', picture)[1].tobytes())
+    truth = np.array([[10, 10, 2e8, 40], [10, -1e300, 20, 2e300], [1e300, 5, 20, 20]])
+    drawn = strips.strip(
+        tmp_path / 'p.zip', 1.0, truth, {'kcf': truth}, {'kcf': '#00ff00'}, 'kcf', np.zeros(3, bool)
+    )
+    sheet = cv2.imdecode(np.frombuffer(drawn, np.uint8), cv2.IMREAD_COLOR)
+    assert sheet.shape == (90, 3 * (180 + 4) - 4, 3), 'the largest height and width for each'
+    # The line of the first truth goes to the right edge of its picture, at 1.5 times its size.
+    assert np.ptp(sheet[10:20, 60:118].astype(int), axis=(0, 1)).min() > 60
 
 
 def write_scene(path: Path, frames: int, shift: int) -> None:
@@ -482,7 +539,14 @@ def test_the_command_lists_what_failed_and_goes_on(scenes: Path, tmp_path: Path,
         (['sim:normal', '--duration', '-1'], 'duration is -1 s'),
         (['sim:normal', '--seeds', 'x'], 'seeds'),
         (['sim:normal', '--boxes', 'x'], 'NAME=FOLDER'),
-        (['sim:normal', '--eao-lengths', '9-3'], '--eao-lengths'),
+        (['sim:normal', '--short-term', '--eao-lengths', '9-3'], "'9-3': give LOW-HIGH"),
+        (['sim:normal', '--eao-lengths', '3-9'], 'means nothing without --short-term: add it'),
+        (['--merge', 'p', '--variants', 'kcf'], '--variants means nothing with --merge'),
+        (['--merge', 'p', '--fresh'], '--fresh means nothing with --merge'),
+        (['--merge', 'p', '--fps', '20'], '--fps means nothing with --merge'),
+        (['--merge', 'p'], 'p holds no part'),
+        (['x', '--identity', '--kind', 'otb'], '--kind means nothing with --identity'),
+        (['sim:occlusion', '--scenarios', 'normal'], '--scenarios normal: none of these is among'),
         (['sim:normal', '--variants', 'kcf', '--ablate'], '--ablate'),
         (['sim:normal', 'sim:normal'], 'two sequences are named normal/1'),
     ],
@@ -508,6 +572,18 @@ def test_a_folder_in_which_nothing_was_measured_goes_if_it_was_made_for_it(
     (tmp_path / 'old').mkdir()
     assert main([*words, str(tmp_path / 'old')]) == 2
     assert (tmp_path / 'old' / 'failures.txt').exists()
+
+
+def test_tables_of_the_report_before_go_and_nothing_else(scenes: Path, tmp_path: Path):
+    report = tmp_path / 'report'
+    words = ['evaluate', str(scenes), '--variants', 'kcf', '--jobs', '1', '--report', str(report)]
+    assert main([*words, '--short-term']) == 0
+    tables = {path.name for path in (report / 'tables').iterdir()}
+    assert 'vot_short_term.csv' in tables
+    (report / 'tables' / 'notes.csv').write_text('mine')
+    assert main(words) == 0
+    left = {path.name for path in (report / 'tables').iterdir()}
+    assert left == tables - {'vot_short_term.csv'} | {'notes.csv'}
 
 
 def test_options_that_change_the_data_stand_in_the_report(scenes: Path, tmp_path: Path):

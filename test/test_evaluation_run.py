@@ -291,6 +291,8 @@ def test_plain_boxes_with_scores_and_absences(tmp_path: Path):
     tracks = boxfiles.read(path, named(), opened(4), range(4))
     assert [t.box for t in tracks] == [Box(1, 2, 3, 4), None, None, Box(5, 6, 7, 8)]
     assert tracks[0].score == 0.9
+    path.write_text('1,2,3,4,nan\n')
+    assert boxfiles.read(path, named(), opened(1), range(1))[0].score == 1, 'as one without'
 
 
 def test_boxes_of_otb_results_are_1_based(tmp_path: Path):

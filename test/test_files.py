@@ -211,6 +211,7 @@ def test_what_macos_leaves_beside_files_is_not_read(kind: str, tmp_path: Path) -
     [
         '1,nan,3,4', 'inf,2,3,4', '1,2,3,-inf', 'nan,nan,nan,4',
         '1,2,-3,4', '1,2,3,-4', '1,2,3,4,5', '1,2,3,4,5,6,7', '1,2,nan,4,5,6,7,8',
+        '1,2,1e300,4', '-1e10,2,3,4', '1,2,3,4,5,6,7,2e9',
     ],
 )  # fmt: skip
 def test_what_is_no_box_is_an_error_that_names_the_line(

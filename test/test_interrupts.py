@@ -251,6 +251,24 @@ def test_evaluate_finishes_the_run_under_way_and_reports(
     assert begun[2:] == ['crowd/1']
 
 
+def test_a_part_that_was_stopped_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = runner.run_job
+
+    def stopping(job: jobs.Job) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return real(job)
+
+    folder = tmp_path / 'report'
+    words = [*EVALUATE, str(folder), '--jobs', '1', '--shard', '1/1']
+    with monkeypatch.context() as patch:
+        patch.setattr(runner, 'run_job', stopping)
+        assert main(words) == 130
+    assert (folder / 'results').exists()
+    assert not (folder / 'parts').exists()
+    assert main(words) == 0
+    assert (folder / 'parts' / '1_of_1.json').exists()
+
+
 def test_evaluate_finishes_the_report_that_it_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

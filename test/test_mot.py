@@ -90,6 +90,15 @@ def test_tracks_are_written_with_minus_one_where_something_is_unknown(tmp_path: 
     )
 
 
+def test_a_box_that_is_nearly_nothing_is_written_so_that_it_can_be_read(tmp_path: Path):
+    box = (3.0, 4.0, 1e-9, 20.0)
+    with MotWriter(tmp_path / 'out.txt') as writer:
+        writer.write_tracks(0, {7: Track(Box(*box), TrackState.TRACKING, 0.9)})
+    (tmp_path / 'all.txt').write_text(mot_text(Sightings.of([0], [7], [box])))
+    for name in ('out.txt', 'all.txt'):
+        assert read_mot(tmp_path / name).boxes.tolist() == [list(box)]
+
+
 def test_what_cannot_be_written_is_named(tmp_path: Path):
     (tmp_path / 'file').touch()
     with pytest.raises(RecordingError, match=r'file/out\.txt cannot be written'):

@@ -141,7 +141,7 @@ def test_results_of_other_options_are_not_replaced_unasked(
     words = ['track', f'{recordings}/normal_*', *WORDS, '--param', 'padding=2.0']
     before = results(tmp_path / 'out')
     assert main([*words, '--output', str(tmp_path / 'out')]) == 2
-    assert 'normal_0.csv and 1 more would be replaced' in capsys.readouterr().err
+    assert 'normal_0.csv and 3 more would be replaced' in capsys.readouterr().err
     assert results(tmp_path / 'out') == before
 
 
@@ -267,6 +267,22 @@ def test_tables_of_something_else_are_not_replaced_unasked(
     assert main([*words, '--overwrite']) == 0
     assert main(words) == 0, 'its own are gone on with'
     assert len(rows_of(tmp_path / 'tracks.csv')) == 5
+
+
+def test_tables_of_other_recordings_are_not_replaced_unasked(
+    recordings: Path, tracked: Path, tmp_path: Path, capsys
+):
+    out = tmp_path / 'out'
+    shutil.copytree(tracked, out)
+    before = results(out)
+    walk = ['track', str(recordings / 'walk.mcap')]
+    words = [*WORDS, '--output', str(out)]
+    assert main([*walk, *words]) == 2
+    assert 'sources.csv and 1 more would be replaced' in capsys.readouterr().err
+    assert results(out) == before
+    assert main([*walk, *words, '--overwrite']) == 0
+    assert main([*walk, str(recordings / 'normal_0'), *words]) == 0, 'one more loses nothing'
+    assert [r['name'] for r in rows_of(out / 'sources.csv')] == ['walk', 'normal_0']
 
 
 def test_a_run_that_a_full_disk_ended_is_gone_on_with(

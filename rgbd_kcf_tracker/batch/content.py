@@ -35,23 +35,25 @@ def files_digest(paths: Sequence[Path]) -> str:
 
     Args:
         paths: in an order that means something; one that is missing is part of the digest. Only
-            their last names count, not where they lie. What cannot be read counts as missing, and
-            is told when it is used.
+            their last names count, not where they lie. A file that cannot be read counts as
+            missing, and is told when it is used.
     """
-    try:
-        files = [entry for path in paths for entry in _files(path)]
-        cache = _Cache(files)
-        result = cache.read()
-        if result is None:
-            digest = hashlib.sha256()
-            for name, path, _ in files:
+    files = [entry for path in paths for entry in _files(path)]
+    cache = _Cache(files)
+    result = cache.read()
+    if result is None:
+        digest, whole = hashlib.sha256(), True
+        for name, path, _ in files:
+            held = MISSING
+            try:
                 held = _file_digest(path) if path else MISSING
-                digest.update(_bytes(f'{name}\0{held}\0'))
-            result = digest.hexdigest()[:32]
+            except OSError:
+                whole = False
+            digest.update(_bytes(f'{name}\0{held}\0'))
+        result = digest.hexdigest()[:32]
+        if whole:  # what cannot be read now may be readable soon
             cache.write(result)
-        return result
-    except OSError:
-        return MISSING
+    return result
 
 
 _Entry = tuple[str, Path | None, os.stat_result | None]
@@ -59,7 +61,7 @@ _Entry = tuple[str, Path | None, os.stat_result | None]
 
 def _files(path: Path) -> Iterator[_Entry]:
     """Name within the digest, place and state of a file, or of the files in a folder."""
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path's, it is no error where nothing may be asked
         for folder, subfolders, names in walk(path):
             subfolders[:] = sorted(n for n in subfolders if not n.startswith('.'))
             for name in sorted(n for n in names if not n.startswith('.')):
@@ -67,11 +69,17 @@ def _files(path: Path) -> Iterator[_Entry]:
                 yield _entry(f'{path.name}/{file.relative_to(path).as_posix()}', file)
     else:
         yield _entry(path.name, path)
+        log = path.with_name(f'{path.name}-wal')
+        if os.path.isfile(log):  # of a database, which is read with it
+            yield _entry(log.name, log)
 
 
 def _entry(name: str, path: Path) -> _Entry:
     """Only of files is the content read: a pipe would be waited for, and is refused when used."""
-    state = path.stat() if path.exists() else None
+    try:
+        state = path.stat()
+    except OSError:
+        state = None
     return name, path if state is not None and stat.S_ISREG(state.st_mode) else None, state
 
 

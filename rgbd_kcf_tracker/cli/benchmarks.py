@@ -121,6 +121,9 @@ def run_options(
 _OF_SCENES = {'seeds': '1', 'scenarios': None, 'duration': None, 'size': '960x540'}
 """Options of simulated scenes, and what they are where not given."""
 
+USUAL = {'kind': 'auto', 'fps': DEFAULT_FPS, **_OF_SCENES}
+"""Options of :func:`add_data_options` as they are where not given."""
+
 
 def checked(args: argparse.Namespace, sequences: list[Benchmark]) -> list[Benchmark]:
     """Sequences as they can be measured.
@@ -129,12 +132,19 @@ def checked(args: argparse.Namespace, sequences: list[Benchmark]) -> list[Benchm
         ParameterError: where two have one name, for their results would lie in one file, or where
             an option of :func:`add_data_options` chooses nothing.
     """
+    from rgbd_kcf_tracker.evaluation.datasets.simulated import PREFIX
     from rgbd_kcf_tracker.evaluation.store import slug
 
     for name in words(args.sequences or ''):
         if not any(name in sequence.name for sequence in sequences):
             raise ParameterError(f'--sequences: none has {name!r} in its name')
     if all(sequence.path is not None for sequence in sequences):
+        scenes = not sequences or any(text.startswith(PREFIX) for text in args.dataset)
+        if args.scenarios and scenes:
+            raise ParameterError(
+                f'--scenarios {args.scenarios}: none of these is among the simulated scenes of '
+                'DATASET'
+            )
         for option, usual in _OF_SCENES.items():
             if getattr(args, option) != usual:
                 raise ParameterError(f'--{option} means nothing without simulated scenes')

@@ -10,7 +10,7 @@ import contextlib
 import dataclasses
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, TypeVar
 
@@ -119,15 +119,28 @@ def add_scene_options(parser: argparse.ArgumentParser, seed: int = 0) -> None:
 
 
 def refuse(
-    args: argparse.Namespace, where: str, names: Sequence[str], cure: str = 'leave one of them out'
+    args: argparse.Namespace,
+    where: str,
+    names: Sequence[str],
+    cure: str = 'leave one of them out',
+    usual: Mapping[str, object] | None = None,
 ) -> None:
     """Options that mean nothing somewhere, rather than leaving them out silently.
+
+    Args:
+        args: all options.
+        where: they mean nothing, in words.
+        names: of these options.
+        cure: what to do.
+        usual: what options are that were not given, where that is not nothing.
 
     Raises:
         ParameterError: for one that was given.
     """
     for name in names:
         value = getattr(args, name)
+        if usual is not None and value == usual.get(name):
+            continue
         if value not in (None, [], '') and value is not False:  # 0 was given, too
             option = '--' + name.replace('_', '-')
             raise ParameterError(f'{option} means nothing {where}: {cure}')

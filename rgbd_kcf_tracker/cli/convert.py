@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.cli.common import (
     escaped,
     progress,
     read_options,
+    refuse,
     refuse_reading,
     warn,
 )
@@ -25,6 +26,7 @@ from rgbd_kcf_tracker.errors import RecordingError
 NAME = 'convert'
 HELP = 'write any recording as an mcap file; mends a bag that was cut off'
 CAMERAS = ('generic', 'kinect2_hd', 'kinect2_qhd', 'kinect2_sd')
+USUAL = {'camera': CAMERAS[0]}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--camera',
         choices=CAMERAS,
-        default='generic',
+        default=USUAL['camera'],
         help="topic names for a folder: the tracker node's own (generic, the default) or "
         "kinect2_bridge's; a bag keeps its names",
     )
@@ -87,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             warnings.show()
         print(escaped(f'{dest}: {count} frames'))
         return 0
+    refuse(args, 'for a bag, which keeps its names', ('camera',), 'leave it out', USUAL)
     refuse_reading(args, 'for a bag, of which every message is copied: leave it out')
     bag = RawBag(source)
     try:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rgbd_kcf_tracker.cli.benchmarks import (
+    USUAL,
     add_data_options,
     check_report,
     checked,
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
 
 NAME = 'evaluate'
 HELP = 'run trackers on benchmarks or simulated scenes and write a report'
+
+_OF_ONE_TARGET = ('short_term', 'eao_lengths', 'export')
+_OF_MERGE = ('merge', 'dataset', 'report', 'overwrite', 'run')
 
 _EPILOG = """\
 data sets:
@@ -143,10 +147,12 @@ def run(args: argparse.Namespace) -> int:
     if not args.dataset:
         raise ParameterError('no data: give DATASET, or --merge DIR... to join parts')
     if args.everyone:
-        refuse(args, 'with --everyone', ('short_term', 'eao_lengths', 'export'))
+        refuse(args, 'with --everyone', ('kind', *_OF_ONE_TARGET), usual=USUAL)
     check_report(args.report, args.dataset, args.overwrite)
     if args.identity:
         return _identity(args)
+    if not args.short_term:
+        refuse(args, 'without --short-term', ('eao_lengths',), 'add it, or leave this out')
     contenders, ablated = _contenders(args)
     eao_lengths = _lengths(args.eao_lengths)
     read = data_options(args, everyone=args.everyone or args.identity)
@@ -162,6 +168,8 @@ def run(args: argparse.Namespace) -> int:
         )
         if shard is None:
             return _report(args.report, whole)
+        if interrupts.asked:  # it is no part until all of it has run
+            return end(failures)
         write_part(args.report, shard, sequences, whole)
     print(f'part {shard}: {len(own)} of {len(sequences)} sequences; join all parts with --merge')
     return end(failures)
@@ -174,11 +182,13 @@ def _merge(args: argparse.Namespace) -> int:
 
     if args.dataset:
         raise ParameterError('--merge takes the folders of parts alone: their data is known')
+    others = [name for name in vars(args) if name not in _OF_MERGE]
+    refuse(args, 'with --merge', others, 'it is of the parts, leave it out', USUAL)
     check_report(args.report, (), args.overwrite)
     # The report may be one of the parts, or lie in one; of the others nothing is written to.
     whose = Path(os.path.realpath(args.report))
-    others = [p for p in args.merge if not whose.is_relative_to(os.path.realpath(p))]
-    check_held(args.report, others)
+    apart = [p for p in args.merge if not whose.is_relative_to(os.path.realpath(p))]
+    check_held(args.report, apart)
     with report_folder(args.report):
         whole = join(args.merge, args.report)
         record(args.report, 'parts joined', parts=[str(place) for place in args.merge])
@@ -217,7 +227,7 @@ def _identity(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
 
     options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'fresh', *WORKER_OPTIONS)
-    refuse(args, 'with --identity', (*options, 'short_term', 'eao_lengths', 'export'))
+    refuse(args, 'with --identity', ('kind', *options, *_OF_ONE_TARGET), usual=USUAL)
     read = data_options(args, everyone=args.everyone or args.identity)
     sequences = checked(args, [s for text in args.dataset for s in open_dataset(text, read)])
     with report_folder(args.report):
@@ -303,7 +313,7 @@ def _contenders(args: argparse.Namespace) -> tuple[list[Contender], list[str]]:
         base = contenders.variant(name, overrides.get(name))
         found.append(base)
         if args.everyone:
-            base.make_set()  # tried out, so that an error comes at once
+            base.make_set().everyone = True  # tried out, so that an error comes at once
         if args.ablate and (base.kind == 'variant' and contenders.switches(base)):
             found.extend(contenders.ablations(base))
             ablated.append(base.name)

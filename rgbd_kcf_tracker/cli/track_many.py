@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import csv
 import glob
 import hashlib
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,7 +145,7 @@ def _run_in(
         own = _identified(own, None if args.cluster is None else workers)
         todo = [job for job in own if not _is_done(folders['output'], job)]
         if not args.overwrite:
-            _refuse_to_replace(todo, tables)
+            _refuse_to_replace(todo, tables, {job.name for job in jobs})
         rows: dict[str, dict[str, Any]] = {}
         with Progress(len(own), 'recording') as progress, interrupts.held(NOTICE):
             progress.report(len(own) - len(todo), '', found=True)
@@ -375,8 +376,16 @@ def _refuse_to_write(jobs: Sequence[TrackJob], others: Sequence[Path], read: lis
     check_outputs(there, read, overwrite=True)
 
 
-def _refuse_to_replace(jobs: Sequence[TrackJob], tables: Sequence[Path]) -> None:
-    """Refuse to replace what no earlier run of the same command wrote."""
+def _refuse_to_replace(
+    jobs: Sequence[TrackJob], tables: Sequence[Path], names: Collection[str]
+) -> None:
+    """Refuse to replace what no earlier run of the same command wrote.
+
+    Args:
+        jobs: whose files will be written.
+        tables: of all recordings, :data:`SOURCES` first.
+        names: of all recordings: tables of others are of another command.
+    """
     folder = tables[0].parent
     there = [
         path
@@ -384,7 +393,7 @@ def _refuse_to_replace(jobs: Sequence[TrackJob], tables: Sequence[Path]) -> None
         for path in _files(job)
         if path.exists() and not _was_begun(folder, job, path)
     ]
-    if not (folder / RECORD).exists():
+    if not ((folder / RECORD).exists() and _names_in(tables[0]) <= set(names)):
         there += [path for path in tables if path.exists()]
     if there:
         more = f' and {len(there) - 1} more' if len(there) > 1 else ''
@@ -392,6 +401,15 @@ def _refuse_to_replace(jobs: Sequence[TrackJob], tables: Sequence[Path]) -> None
             f'{there[0]}{more} would be replaced, made with other options, another version, from '
             'another recording or by something else: give another folder, or add --overwrite'
         )
+
+
+def _names_in(sources: Path) -> set[str]:
+    """The recordings in a table of them; '' among them where it is none."""
+    try:
+        with sources.open(encoding='utf-8', newline='') as file:
+            return {row.get('name') or '' for row in csv.DictReader(file)}
+    except (OSError, ValueError, csv.Error):
+        return {''}
 
 
 def _follow(job: TrackJob) -> dict[str, Any]:

@@ -23,7 +23,8 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.evaluation.store import read_tracks, slug
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.recordings.textfiles import box_or_none, read_lines
+from rgbd_kcf_tracker.recordings.messages import LARGEST
+from rgbd_kcf_tracker.recordings.textfiles import box_of_region, box_or_none, read_lines
 from rgbd_kcf_tracker.track import Track, TrackState
 
 _SUFFIXES = ('.csv', '.txt')
@@ -108,7 +109,7 @@ def _read_rows(path: Path, sequence: Sequence) -> list[tuple[Box | None, float]]
         except ValueError:
             raise DatasetError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no box: write x,y,width,height '
-                '(nan,nan,nan,nan where absent)'
+                f'(nan,nan,nan,nan where absent), at most {LARGEST:.0f} pixels'
             ) from None
         known = scores is not None and not np.isnan(scores[number - 1])
         rows.append((box, float(scores[number - 1]) if scores is not None and known else score))
@@ -122,8 +123,9 @@ def _parse(line: str, sequence: Sequence) -> tuple[Box | None, float]:
         return (None if box is None else box.moved(-sequence.origin, -sequence.origin)), 1.0
     a, b, c, d, last = values
     if sequence.kind == 'princeton':  # two corners, and whether the target is hidden
-        return box_or_none(a, b, c - a, d - b), 1.0
-    return box_or_none(a - sequence.origin, b - sequence.origin, c, d), last
+        return box_of_region([a, b, c - a, d - b]), 1.0
+    box = box_of_region([a - sequence.origin, b - sequence.origin, c, d])
+    return box, 1.0 if math.isnan(last) else last
 
 
 def _confidence(path: Path, lines: int) -> list[float] | None:

@@ -270,7 +270,9 @@ def is_done(folder: Path, sequence: Sequence, tracker: str, key: str, truth_key:
     places = Places(folder, sequence.name, truth_key)
     if not (places.truth.is_file() and places.tracks(tracker).is_file()):
         return False
-    return was_made_as(places.meta(tracker), key)
+    if not was_made_as(places.meta(tracker), key):
+        return False
+    return places.bodies.is_file() or not read_json(places.meta(tracker)).get('bodies')
 
 
 def read(folder: Path, sequence: Sequence, tracker: str, truth_key: str) -> EveryoneResult:

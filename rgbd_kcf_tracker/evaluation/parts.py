@@ -21,7 +21,7 @@ from rgbd_kcf_tracker.batch.shards import Shard
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
-from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions
+from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions, is_done
 from rgbd_kcf_tracker.evaluation.report import Heading
 from rgbd_kcf_tracker.evaluation.store import read_json
 from rgbd_kcf_tracker.geometry import Intrinsics
@@ -95,8 +95,8 @@ def join(folders: Items[Path], folder: Path) -> Whole:
         folder: of the report; may be one of them.
 
     Raises:
-        DatasetError: where a part is missing, is there twice with other results, or is of another
-            run.
+        DatasetError: where a part is missing, is not whole, is there twice with other results, or
+            is of another run.
     """
     found: dict[int, tuple[Path, dict[str, Any]]] = {}
     for place in folders:
@@ -118,7 +118,29 @@ def join(folders: Items[Path], folder: Path) -> Whole:
     for place in dict.fromkeys(path.parent.parent for path, _ in parts):
         if place.resolve() != folder.resolve():
             _copy(place, folder)
-    return _whole([content for _, content in parts])
+    whole = _whole([content for _, content in parts])
+    _check_done(folder, whole, count)
+    return whole
+
+
+def _check_done(folder: Path, whole: Whole, count: int) -> None:
+    """Every run is there or is known to have failed: a report of some would look like all."""
+    failed = {(f.sequence, f.tracker) for f in whole.failures}
+    missing, shards = [], set()
+    for place, sequence in enumerate(whole.sequences):
+        for contender in whole.contenders:
+            if {(sequence.name, ''), (sequence.name, contender.name)} & failed:
+                continue
+            if not is_done(folder, sequence, contender, whole.options):
+                missing.append(f'{sequence.name} ({contender.name})')
+                shards.add(place % count + 1)
+    if missing:
+        raise DatasetError(
+            f'{len(missing)} runs are missing: {", ".join(missing[:8])}'
+            f'{", ..." if len(missing) > 8 else ""}: run '
+            f'{", ".join(f"--shard {i}/{count}" for i in sorted(shards)[:8])}'
+            f'{", ..." if len(shards) > 8 else ""} again'
+        )
 
 
 def _take(

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,12 +31,13 @@ from rgbd_kcf_tracker.evaluation.jobs import Failure
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
 from rgbd_kcf_tracker.evaluation.place_tables import places_table
-from rgbd_kcf_tracker.evaluation.store import slug, write_json
+from rgbd_kcf_tracker.evaluation.store import read_json, slug, write_json
 from rgbd_kcf_tracker.evaluation.table import Table
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 PAGE = 'index.html'
 PER_FRAME = 'per_frame.csv'
+NUMBERS = 'report.json'
 BEGUN_NAMES = frozenset({'parts', 'results', 'thumbs', 'times', 'truth'})
 """What a report folder may hold before its runs are recorded in it."""
 
@@ -104,7 +106,7 @@ def write_report(
         },
         'curves': curves,
     }
-    write_json(folder / 'report.json', numbers, indent=1)
+    write_json(folder / NUMBERS, numbers, indent=1)
 
     palette = plot_style.colors(measured.trackers)
     main = main_tracker(measured.trackers, contenders, heading.ablated)
@@ -153,7 +155,7 @@ def write_everyone_report(
     numbers = _numbers(every, contenders, failures, heading) | {
         'sequences': {r.sequence: {'scenario': r.scenario, 'kind': EVERYONE} for r in results},
     }
-    write_json(folder / 'report.json', numbers, indent=1)
+    write_json(folder / NUMBERS, numbers, indent=1)
     palette = plot_style.colors(list(dict.fromkeys(r.tracker for r in results)))
     content = {'everyone': every} | _head(
         heading, failures, palette, {r.sequence: r.frames for r in results}
@@ -183,7 +185,7 @@ def write_identity_report(
     _write_tables(folder, every)
     write_atomically(folder / 'pairs.csv', identity_tables.pairs_csv(pairs))
     frames = {s.recording: s.frames for p in pairs for s in p.seen}
-    write_json(folder / 'report.json', _numbers(every, (), failures, heading), indent=1)
+    write_json(folder / NUMBERS, _numbers(every, (), failures, heading), indent=1)
     content = {
         'identity': every,
         'identity_plot': page.uri(plots.pairs_plot(reliabilities)),
@@ -216,7 +218,7 @@ def write_sweep_report(
     _write_tables(folder, every)
     write_atomically(folder / 'settings.csv', sweep_tables.settings_csv(found))
     contenders = [found.default.contender, *(found.settings[i].contender for i in found.finalists)]
-    write_json(folder / 'report.json', _numbers(every, contenders, failures, heading), indent=1)
+    write_json(folder / NUMBERS, _numbers(every, contenders, failures, heading), indent=1)
     effects = [(axis.info.name, *sweep_tables.effect(found, axis)) for axis in found.axes]
     shown = f'{found.measure} %' if found.scale == 100 else f'{found.measure} px'
     content = {
@@ -259,11 +261,27 @@ def _head(
 
 
 def _write_tables(folder: Path, every: Sequence[Table]) -> None:
+    keys = {table.key for table in every}
+    for key in _keys_before(folder) - keys:
+        with contextlib.suppress(OSError):
+            (folder / 'tables' / _file_of(key)).unlink()
     for table in every:
-        write_atomically(folder / 'tables' / f'{slug(table.key)}.csv', table.csv())
+        write_atomically(folder / 'tables' / _file_of(table.key), table.csv())
     write_atomically(
         folder / 'tables.md', '\n'.join(f'### {t.title}\n\n{t.markdown()}\n' for t in every)
     )
+
+
+def _file_of(key: str) -> str:
+    return f'{slug(key)}.csv'
+
+
+def _keys_before(folder: Path) -> set[str]:
+    """The tables of the report that lies in a folder: others there are not ours."""
+    try:
+        return set(read_json(folder / NUMBERS)['tables'])
+    except (DatasetError, KeyError, TypeError):
+        return set()
 
 
 def _short(datasets: Sequence[str]) -> str:

@@ -192,7 +192,8 @@ def otb_protocol(measured: Measured) -> Table | None:
         own = [r.frames for s in kept if (r := measured.result(tracker, s)) is not None]
         precision = [otb.precision_at_20(otb.precision_curve(f.error[f.there])) for f in own]
         auc = [otb.area_under_curve(otb.success_curve(f.overlap[f.there])) for f in own]
-        rows.append((tracker, len(own), float(np.mean(precision)), float(np.mean(auc))))
+        means = (float(np.mean(values)) if values else None for values in (precision, auc))
+        rows.append((tracker, len(own), *means))
     return Table(
         'otb',
         'OTB one-pass evaluation',
@@ -262,7 +263,7 @@ def reliability(measured: Measured) -> tuple[Table, dict[tuple[str, str], Scored
             scores = np.concatenate([c.score[c.said] for c in own])
             hits = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= HIT_IOU for c in own])
             near = np.concatenate([np.nan_to_num(c.overlap[c.said]) >= STRANGER_IOU for c in own])
-            if not len(scores) or np.ptp(scores) == 0:
+            if not len(scores) or scores.min() == scores.max():
                 rows.append((tracker, data, len(scores), *[None] * (5 + calibration.BINS)))
                 continue
             on_target = calibration.honesty(scores, near)

@@ -112,22 +112,25 @@ def _spread(values: npt.NDArray[np.int64], count: int) -> list[int]:
 
 
 def _montage(tiles: list[Picture]) -> Picture:
-    height, width = tiles[0].shape[:2]
+    # Pictures of one recording may differ in size.
+    height, width = (max(tile.shape[axis] for tile in tiles) for axis in (0, 1))
     rows = -(-len(tiles) // COLUMNS)
     gap = 4
     across = min(COLUMNS, len(tiles))
     sheet = np.full((rows * (height + gap) - gap, across * (width + gap) - gap, 3), 255, np.uint8)
     for n, tile in enumerate(tiles):
         y, x = (n // COLUMNS) * (height + gap), (n % COLUMNS) * (width + gap)
-        sheet[y : y + height, x : x + width] = tile[:height, :width]
+        sheet[y : y + tile.shape[0], x : x + tile.shape[1]] = tile
     return sheet
 
 
 def _dashed(image: Picture, box: FloatArray) -> None:
     if np.isnan(box[0]):
         return
-    left, top = int(box[0]), int(box[1])
-    right, bottom = int(box[0] + box[2]), int(box[1] + box[3])
+    # Far outside the image OpenCV's coordinates would overflow, and dashes would never end.
+    size = np.array(image.shape[1::-1], np.float64)
+    left, top = np.clip(box[:2], -size, 2 * size).astype(int).tolist()
+    right, bottom = np.clip(box[:2] + box[2:], -size, 2 * size).astype(int).tolist()
     cv2.rectangle(image, (left, top), (right, bottom), _SHADOW, 1)  # seen on bright pictures too
     for x in range(left, right, 8):
         for y in (top, bottom):

@@ -66,7 +66,8 @@ class Table:
         """For a page of documentation."""
         head, *rows = self.cells()
         bar = ['---', *['---:'] * (len(head) - 1)]
-        return '\n'.join('| ' + ' | '.join(row) + ' |' for row in [head, bar, *rows])
+        lines = [[cell.replace('|', '\\|') for cell in row] for row in [head, bar, *rows]]
+        return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 
     def is_best(self, row: tuple[Cell, ...], column: int) -> bool:
         """Whether a cell is the best of its column."""

@@ -74,12 +74,14 @@ def table_4_1(measured: Measured) -> Table:
         ]
         rows.append((tracker, *(scaled(v, 100) for v in (*cells, table['all']['all']))))
     rows += [(name, *values, None) for name, values in thesis.PRINCETON.items()]
+    # One without a frame that counts has no rate, whoever tracks.
+    counted = {r.sequence for r in measured.results if len(r.counted)}
     numbers = [
-        sum(info.categories.get(split) == name for info in measured.infos.values())
+        sum(categories[sequence].get(split) == name for sequence in counted)
         for split, names in _SPLITS
         for name in names
     ]
-    rows.append(('number of sequences', *numbers, len(measured.infos)))
+    rows.append(('number of sequences', *numbers, len(counted)))
     derived = any(info.derived for info in measured.infos.values())
     note = 'R at 0.5, each sequence counting once. '
     if derived:

@@ -240,12 +240,20 @@ def _track_lines(number: int, tracks: Mapping[int, Track]) -> Iterator[str]:
 def _format(
     number: int, who: int, box: Iterable[float], score: float, position: Iterable[float] | None
 ) -> str:
+    x, y, width, height = box
     cells = [
-        *(_short(v, 3) for v in box),
+        *(_short(v, 3) for v in (x, y)),
+        *(_size(v) for v in (width, height)),
         _short(score, 4),
         *(_short(v, 4) for v in ((_UNKNOWN,) * 3 if position is None else position)),
     ]
     return f'{number + 1},{who},{",".join(cells)}\n'
+
+
+def _size(value: float) -> str:
+    """Rounded as all else, but never to 0, which is no size and would be refused when read."""
+    text = _short(value, 3)
+    return repr(value) if text == '0' else text
 
 
 def _short(value: float, digits: int) -> str:

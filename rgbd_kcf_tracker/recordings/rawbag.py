@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from heapq import merge
 from pathlib import Path
 from typing import Any, cast
@@ -24,6 +24,12 @@ from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
 _PARTS = 'relative_file_paths'
 _SUFFIXES = ('.mcap', '.db3', '.bag')
+_STORAGES: dict[bytes, Callable[[Path], Storage]] = {
+    b'\x89MCAP': McapStorage,
+    b'#ROSBAG': Ros1Storage,
+    b'SQLite': SqliteStorage,
+}
+"""By the first bytes of a file."""
 
 
 class RawBag:
@@ -221,15 +227,22 @@ def _open_storage(path: Path) -> Storage:
         head = file.read(16)
     if not head:
         raise RecordingError(f'{path} is empty: nothing was recorded')
-    if head.startswith(b'\x89MCAP'):
-        return McapStorage(path)
-    if head.startswith(b'#ROSBAG'):
-        return Ros1Storage(path)
-    if head.startswith(b'SQLite'):
-        return SqliteStorage(path)
+    for begin, storage in _STORAGES.items():
+        if head.startswith(begin):
+            return storage(path)
     raise RecordingError(
         f'{path} is no recording: it is neither an MCAP file, a rosbag2 database nor a ROS 1 bag'
     )
+
+
+def is_bag_file(path: Path) -> bool:
+    """Whether a file is one of a bag, by its first bytes.
+
+    Raises:
+        RecordingError: where it cannot be read.
+    """
+    with open_file(path) as file:
+        return file.read(16).startswith(tuple(_STORAGES))
 
 
 _TYPESTORES: dict[bool, Any] = {}

@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.camera_info import NO, YES, camera_from_info
 from rgbd_kcf_tracker.recordings.files import read_text
+from rgbd_kcf_tracker.recordings.messages import LARGEST
 from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
 INTRINSICS, CAMERA_INFO = 'intrinsics.json', 'camera_info.json'
@@ -57,7 +58,8 @@ def read_boxes(path: Path, flags: int = 0) -> list[Box | None]:
         except ValueError:
             raise RecordingError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no box: '
-                'write x,y,width,height (nan,nan,nan,nan where absent)'
+                'write x,y,width,height (nan,nan,nan,nan where absent), '
+                f'at most {LARGEST:.0f} pixels'
             ) from None
     return boxes
 
@@ -66,8 +68,10 @@ def box_of_region(values: Sequence[float]) -> Box | None:
     """The upright bounding box of ``x, y, width, height`` or of a polygon's corners.
 
     Raises:
-        ValueError: where it is neither, or half of it; see :func:`box_or_none`.
+        ValueError: where it is neither, or half of it, see :func:`box_or_none`, or beyond reason.
     """
+    if any(abs(value) > LARGEST for value in values):
+        raise ValueError(f'{values}')
     if len(values) == 4:
         return box_or_none(*values)
     if len(values) < 6 or len(values) % 2:

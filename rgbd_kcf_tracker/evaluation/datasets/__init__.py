@@ -141,7 +141,7 @@ def _refuse_topics(found: list[Sequence], options: DatasetOptions) -> None:
 
 def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
     try:
-        here = _sequences_at(path, options)
+        here = _sequences_at(path, options, depth == _DEPTH)
         if here or depth == 0 or not path.is_dir():
             return here
         children = sorted(entries(path), key=lambda p: natural_key(p.name))
@@ -152,7 +152,7 @@ def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
     return [sequence for child in children for sequence in _walk(child, options, depth - 1)]
 
 
-def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
+def _sequences_at(path: Path, options: DatasetOptions, asked: bool) -> list[Sequence]:
     kind = options.kind
     if options.everyone:
         return everyone.find(path, options.fps) if everyone.is_sequence(path) else []
@@ -162,7 +162,8 @@ def _sequences_at(path: Path, options: DatasetOptions) -> list[Sequence]:
         depth_topic=options.depth_topic,
         info_topic=options.info_topic,
     )
-    if recorded.is_sequence(path) and kind in ('auto', recorded.RECORDING):
+    bag = recorded.is_sequence(path) or (asked and recorded.is_named(path))
+    if bag and kind in ('auto', recorded.RECORDING):
         return [recorded.find(path, read)]
     if not path.is_dir():
         return []

@@ -240,12 +240,15 @@ def read_fractions(path: Path) -> list[float]:
     """The first number of each line: how much of the target shows, 0 to 1.
 
     Raises:
-        DatasetError: naming the line without a number.
+        DatasetError: naming the line without such a number.
     """
     result = []
     for number, line in enumerate(read_lines(path), start=1):
         try:
-            result.append(float(line.replace(',', ' ').split()[0]))
+            share = float(line.replace(',', ' ').split()[0])
+            if not 0 <= share <= 1:
+                raise ValueError
+            result.append(share)
         except (ValueError, IndexError):
             raise DatasetError(
                 f'{path}, line {number}: {line.strip()[:60]!r}: write the visible share, 0 to 1'

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
@@ -111,6 +112,18 @@ def load(path: Path) -> Opened:
     return Opened(with_truth(frames, boxes), count, annotated=annotated)
 
 
+def _whole_numbers(values: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """Stamps and numbers of frames, which MATLAB may keep as doubles.
+
+    Raises:
+        ValueError: for NaN, or a number that is too large to be one.
+    """
+    # Beyond, not every whole number is a double.
+    if not (np.abs(values.astype(np.float64)) < 2**53).all():
+        raise ValueError('a stamp or number of a frame is none')
+    return values.astype(np.int64)
+
+
 def _mat(path: Path) -> Path:
     return next((path / n for n in MAT_FILES if (path / n).is_file()), path / MAT_FILES[-1])
 
@@ -126,12 +139,12 @@ def _frames(path: Path) -> tuple[ImageFrames, Path]:
     info: Any = next((v for k, v in content.items() if not k.startswith('__')), None)
     try:
         arrays = {
-            name: np.atleast_1d(np.asarray(getattr(info, name))).astype(np.int64)
+            name: _whole_numbers(np.atleast_1d(np.asarray(getattr(info, name))))
             for name in ('imageTimestamp', 'imageFrameID', 'depthTimestamp', 'depthFrameID')
         }
         camera = np.asarray(getattr(info, 'K', np.full((3, 3), np.nan)), np.float64)
         count = int(getattr(info, 'length', len(arrays['imageTimestamp'])))
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
         raise DatasetError(
             f'{file} is not as Princeton writes it ({error}): it needs imageTimestamp, '
             'imageFrameID, depthTimestamp and depthFrameID'

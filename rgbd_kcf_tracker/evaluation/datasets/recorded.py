@@ -5,12 +5,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import DatasetError
-from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, group
+from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, entries, group
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
 
@@ -20,8 +21,33 @@ RECORDING = 'recording'
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a path is a bag: a file, or a rosbag2 folder."""
-    return path.suffix in SUFFIXES if path.is_file() else (path / 'metadata.yaml').is_file()
+    """Whether a path is a bag: a file that is named as one, or a rosbag2 folder."""
+    if path.is_file():
+        return path.suffix in SUFFIXES
+    return (path / 'metadata.yaml').is_file() or (path.is_dir() and _is_split(path))
+
+
+def is_named(path: Path) -> bool:
+    """Whether a file that was named itself is a bag, whatever its name.
+
+    Raises:
+        RecordingError: where it cannot be read.
+    """
+    from rgbd_kcf_tracker.recordings.rawbag import is_bag_file  # slow to import
+
+    return path.is_file() and is_bag_file(path)
+
+
+def _is_split(folder: Path) -> bool:
+    """Whether all bags in a folder are files of one: rosbag2 names them by it, and numbers them.
+
+    Others are a recording each, as a data set has them.
+    """
+    names = [path.name.removesuffix('.zstd') for path in entries(folder)]
+    bags = [name for name in names if name.endswith(SUFFIXES)]
+    part = re.compile(rf'{re.escape(folder.name)}_[0-9]+\.(mcap|db3)')
+    kinds = {found[1] if (found := part.fullmatch(name)) else None for name in bags}
+    return len(kinds) == 1 and None not in kinds
 
 
 def find(path: Path, options: ReadOptions) -> Sequence:

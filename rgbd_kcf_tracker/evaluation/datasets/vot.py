@@ -10,6 +10,7 @@ masks ``mX,Y,WIDTH,HEIGHT,run,run,...``; ``nan`` or ``0`` where the target is ab
 
 from __future__ import annotations
 
+import math
 import re
 from functools import partial
 from pathlib import Path
@@ -24,6 +25,8 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
 )
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, even_stamps, image_files
+from rgbd_kcf_tracker.recordings.messages import LARGEST
+from rgbd_kcf_tracker.recordings.recording import MAX_FPS, MIN_FPS
 from rgbd_kcf_tracker.recordings.textfiles import box_of_region, read_lines
 
 
@@ -77,9 +80,12 @@ def load(path: Path, fps: float) -> Opened:
     try:
         rate = float(settings.get('fps', fps))
     except ValueError:
+        rate = math.nan
+    if not MIN_FPS <= rate <= MAX_FPS:
         raise DatasetError(
-            f'{path / "sequence"}: fps is {settings["fps"]!r}: give a number'
-        ) from None
+            f'{path / "sequence"}: fps is {settings.get("fps", fps)!r}: give a number from '
+            f'{MIN_FPS:g} to {MAX_FPS:g}'
+        )
     frames = ImageFrames(color_files, depth_files, even_stamps(len(color_files), rate))
     return Opened(with_truth(frames, boxes), len(boxes))
 
@@ -97,7 +103,8 @@ def read_regions(path: Path) -> list[Box | None]:
         except (ValueError, OverflowError):
             raise DatasetError(
                 f'{path}, line {number}: {line.strip()[:60]!r} is no region: write '
-                'x,y,width,height, a polygon, a mask, or nan,nan,nan,nan'
+                f'x,y,width,height, a polygon, a mask, or nan,nan,nan,nan, at most {LARGEST:.0f} '
+                'pixels'
             ) from None
     return result
 
@@ -133,7 +140,7 @@ def _mask_bounds(values: list[int]) -> Box | None:
     bottom = max((b - 1) // width for _, b in inside)
     left = min(0 if a // width != (b - 1) // width else a % width for a, b in inside)
     right = max(width - 1 if a // width != (b - 1) // width else (b - 1) % width for a, b in inside)
-    return Box(x + left, y + top, right - left + 1, bottom - top + 1)
+    return box_of_region([x + left, y + top, right - left + 1, bottom - top + 1])
 
 
 def _settings(path: Path) -> dict[str, str]:

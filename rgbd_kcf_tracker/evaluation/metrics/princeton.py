@@ -51,7 +51,7 @@ def by_category(
     weighted by their numbers of sequences, give the overall mean.
 
     Args:
-        rates: success rate of each sequence.
+        rates: success rate of each sequence; NaN, where no frame counts, is left out.
         categories: of each sequence, the value of each split (keys of :data:`CATEGORIES`).
 
     Returns:
@@ -80,4 +80,5 @@ def by_category(
 
 
 def _mean(values: list[float]) -> float:
-    return float(np.mean(values)) if values else float('nan')
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else float('nan')
