@@ -18,7 +18,18 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
-from bag_rig import Sent, camera_info, camera_messages, header, image, write_mcap, write_ros1
+from bag_rig import (
+    CAMERA,
+    SIZE,
+    Sent,
+    camera_info,
+    camera_messages,
+    header,
+    image,
+    make_frames,
+    write_mcap,
+    write_ros1,
+)
 
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ImageError, ParameterError
@@ -436,3 +447,19 @@ def test_a_lens_of_wrong_numbers_is_refused() -> None:
 def test_no_points_are_bent_to_no_points(lens: Lens) -> None:
     assert lens.bent(np.zeros((0, 2))).shape == (0, 2)
     assert lens.straightened(np.zeros((0, 2))).shape == (0, 2)
+
+
+def test_zeros_after_a_change_of_the_camera_are_passed_over(tmp_path: Path) -> None:
+    """The camera of before the change came back for as long as a driver sent none."""
+    frames = make_frames(9)
+    sent = camera_messages([replace(f, intrinsics=None) for f in frames], info=None)
+    for f, fx in zip(frames, (50, 50, 50, 80, 80, 80, 0, 0, 80), strict=True):
+        told = camera_info(header(f.stamp_ns, 'optical'), *SIZE, replace(CAMERA, fx=fx or 1.0))
+        if not fx:
+            told.k, told.p = np.zeros(9), np.zeros(12)
+        sent.append(Sent(INFO, f.stamp_ns - 1_000_000, told))
+    path = write_mcap(tmp_path / 'a.mcap', sorted(sent, key=lambda s: s.log_ns))
+    with open_recording(path) as recording:
+        for start in (0, 7):
+            seen = [f.intrinsics.fx for f in recording.frames(start) if f.intrinsics is not None]
+            assert seen == [50, 50, 50, 80, 80, 80, 80, 80, 80][start:]

@@ -211,7 +211,7 @@ def test_what_macos_leaves_beside_files_is_not_read(kind: str, tmp_path: Path) -
     [
         '1,nan,3,4', 'inf,2,3,4', '1,2,3,-inf', 'nan,nan,nan,4',
         '1,2,-3,4', '1,2,3,-4', '1,2,3,4,5', '1,2,3,4,5,6,7', '1,2,nan,4,5,6,7,8',
-        '1,2,1e300,4', '-1e10,2,3,4', '1,2,3,4,5,6,7,2e9',
+        '1,2,1e300,4', '-1e10,2,3,4', '1,2,3,4,5,6,7,2e9', '1,,2,3,4',
     ],
 )  # fmt: skip
 def test_what_is_no_box_is_an_error_that_names_the_line(
@@ -282,6 +282,7 @@ def test_camera_info_beside_a_sequence_is_read(
         ('{"K": [0, 0]}', 'camera_info has no 3x3 K'),
         (f'{{"K": [1{"0" * 400}, 0, 31, 0, 71, 22, 0, 0, 1]}}', 'camera_info has no 3x3 K'),
         ('{"K": [70, 0, 31, 0, 71, 22, 0, 0, 1], "roi": 5}', 'roi is no JSON object'),
+        ('{"K": [70, 0, 31, 0, 71, 22, 0, 0, 1], "rectified": "false"}', "rectified is 'false'"),
         ('[' * 100_000, 'it is nested too deeply'),
     ):
         info.write_text(text)
@@ -290,6 +291,22 @@ def test_camera_info_beside_a_sequence_is_read(
     (source / 'intrinsics.json').write_text('{"fx": 60, "fy": 61, "cx": 31.5, "cy": 23.5}')
     with open_recording(source) as recording:
         assert recording.intrinsics == CAMERA
+
+
+def test_a_camera_for_images_of_another_size_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As in a bag: its metres would be wrong by the ratio."""
+    source = write_folder(tmp_path / 'seq')
+    (source / 'intrinsics.json').unlink()
+    info = source / 'camera_info.json'
+    info.write_text('{"width": 1920, "height": 1080, "K": [1000, 0, 960, 0, 1000, 540, 0, 0, 1]}')
+    with open_recording(source) as recording:
+        assert recording.intrinsics is None
+        (warning,) = recording.warnings
+    assert warning.startswith('camera_info.json is for 1920x1080 images but these are ')
+    (sequence,) = open_dataset(str(source))
+    assert next(iter(sequence.open().samples)).frame.intrinsics is None
 
 
 def test_a_database_with_a_log_is_read_and_left_as_it_is(tmp_path: Path) -> None:

@@ -347,6 +347,17 @@ def test_a_tiff_with_huge_tiles_is_refused() -> None:
             inspect(memoryview(hostile_tiff(64, 64, **tags)))
 
 
+def test_a_jpeg_of_many_scans_is_refused() -> None:
+    """Each scan of a progressive one goes through all of it: a second for some hundred bytes."""
+    image = np.random.default_rng(1).integers(0, 255, (64, 64, 3), np.uint8)
+    options = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]
+    data = cv2.imencode('.jpg', image, options)[1].tobytes()
+    assert decode_compressed_color(message(format='jpeg', data=data)).shape == image.shape
+    scan = data[data.rindex(b'\xff\xda') : -2]
+    with pytest.raises(ImageError, match='more than 100 scans'):
+        inspect(memoryview(data[:-2] + 100 * scan + data[-2:]))
+
+
 def test_a_png_with_a_huge_chunk_is_refused() -> None:
     """Found by fuzzing: OpenCV 5 allocates what the length of a chunk claims."""
     data = bytearray(encode_bare_depth(depth_image(), 'png').data.tobytes())

@@ -5,12 +5,16 @@
 
 from __future__ import annotations
 
+from array import array
 from itertools import pairwise
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rgbd_kcf_tracker.recordings.bag_pairing import pair_topics
 from rgbd_kcf_tracker.recordings.pairing import Pair, StampPairer, patient_pairer
+from rgbd_kcf_tracker.recordings.storage import Topic
 
 MS = 1_000_000
 
@@ -209,3 +213,18 @@ def test_whatever_comes_in_comes_out_once_and_in_order(
     assert total == len(events)
     given_out = len(colors) + len(depths)
     assert given_out + counts.depth_alone + counts.duplicates + counts.late == total
+
+
+@pytest.mark.parametrize('stray', [5 * 10**9, None])
+def test_a_stray_stamp_on_either_stream_costs_its_own_frame_alone(stray: int | None) -> None:
+    """Both streams jumped back once, at other places: all depth between them was lost."""
+    stamps = [10**12 + i * 33_333_333 for i in range(300)]
+    topics = []
+    for name, at in (('color', 50), ('depth', 250)):
+        topic = Topic(name, 'x')
+        told = list(stamps)
+        told[at] = 0 if stray is None else told[at] + stray
+        topic.stamp_ns, topic.log_ns = array('q', told), array('q', stamps)
+        topics.append(topic)
+    pairs, _ = pair_topics(*topics, None)
+    assert sum(pair.depth is not None for pair in pairs) >= 297

@@ -8,6 +8,7 @@ from __future__ import annotations
 import pytest
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.bag_topics import role_by_name
 from rgbd_kcf_tracker.recordings.topics import ChosenTopics, ImageTopic, base_name, choose_topics
 
 
@@ -181,3 +182,19 @@ def test_transports_are_taken_off() -> None:
     assert base_name('/a/image/compressedDepth') == '/a/image'
     assert base_name('/a/image/compressed') == '/a/image'
     assert base_name('/a/image') == '/a/image'
+
+
+@pytest.mark.parametrize(
+    ('name', 'role'),
+    [
+        ('/depth_cam/color/image_raw/compressed', 'color'),
+        ('/depth_cam/rgb/image_raw', 'color'),
+        ('/depth_cam/depth/image_raw', 'depth'),
+        ('/camera/aligned_depth_to_color/image_raw/compressedDepth', 'depth'),
+        ('/kinect2/hd/image_depth_rect', 'depth'),
+        ('/camera/depth_registered/hw_registered/image_rect_raw', 'depth'),
+        ('/camera/image_raw', 'color'),
+    ],
+)
+def test_colour_below_a_camera_that_is_called_after_depth_is_colour(name: str, role: str) -> None:
+    assert role_by_name(name) == role

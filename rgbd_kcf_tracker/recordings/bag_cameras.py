@@ -42,6 +42,7 @@ class BagCameras:
         self._bag, self._topic = bag, topic
         self._pictures, self._rectified, self._warn = pictures, rectified, warn
         self._last: tuple[bytes, Camera | None] = b'', None
+        self._newest_up_to: tuple[int, Camera | None] = -1, None
         self._changed = False
         self._fault = ''
         self.first: Camera | None = None
@@ -54,7 +55,7 @@ class BagCameras:
             warn(f'{topic.name}{self._fault}{taken}')
 
     def of(self, log_ns: int, size: tuple[int, int], number: int) -> Intrinsics | None:
-        """The camera of a picture; that of the first frames where a CameraInfo holds none.
+        """The camera of a picture: the newest that a CameraInfo held, or else the first.
 
         Args:
             log_ns: when the picture was recorded.
@@ -65,7 +66,7 @@ class BagCameras:
             None where it is not known, or is one for pictures of another size.
         """
         index = bisect_right(self._topic.log_ns, log_ns) - 1
-        camera = (self._camera(index) if index >= 0 else None) or self.first
+        camera = self._newest(index) or self.first
         if camera is None:
             return None
         first = self.first or camera
@@ -90,6 +91,16 @@ class BagCameras:
             self._warn(f'{self._topic.name} {misfit}: left out')
             return None
         return camera.intrinsics
+
+    def _newest(self, index: int) -> Camera | None:
+        """What the newest messages up to one hold, zeros passed over."""
+        known, camera = self._newest_up_to
+        for number in range(index, max(index - LOOKED_AT, -1), -1):
+            found = camera if number == known else self._camera(number)
+            if found is not None or number == known:
+                self._newest_up_to = index, found
+                return found
+        return None
 
     def _camera(self, index: int) -> Camera | None:
         """What a message holds, None where that is no camera."""

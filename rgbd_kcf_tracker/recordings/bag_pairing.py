@@ -24,6 +24,8 @@ _Event = tuple[int, bool, int]
 """Stamp, whether it is colour, and number of a message."""
 
 _WIDEST_S = 0.5
+_TOGETHER_NS = 1_000_000_000
+"""Between the times of recording of colour and depth up to which both jumped back together."""
 _JUMP_NS = round(JUMP_BACK_S * 1e9)
 
 
@@ -134,9 +136,14 @@ def _rounds(
     """
     colors, depths = _segments(color[0]), _segments(depth[0])
     count = max(colors, default=0) + 1
-    if depths and depths[-1] + 1 != count:
-        # Depth that is missing about a jump does not show it, but when it was recorded does.
-        starts = [color[1][colors.index(n)] for n in range(1, count)]
+    starts = [color[1][colors.index(n)] for n in range(1, count)]
+    others = [depth[1][depths.index(n)] for n in range(1, max(depths, default=0) + 1)]
+    together = len(starts) == len(others) and all(
+        abs(a - b) < _TOGETHER_NS for a, b in zip(starts, others, strict=True)
+    )
+    if depths and not together:
+        # Depth that is missing about a jump does not show it, and a stray stamp is one in one
+        # stream alone, but when they were recorded tells.
         depths = [bisect_right(starts, logged) for logged in depth[1]]
     rounds: list[list[_Event]] = [[] for _ in range(count)]
     for is_color, segments, stamps in ((True, colors, color[0]), (False, depths, depth[0])):

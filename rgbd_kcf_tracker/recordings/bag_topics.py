@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.recordings.images import (
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.recordings.recording import StreamInfo
 from rgbd_kcf_tracker.recordings.storage import Topic
-from rgbd_kcf_tracker.recordings.topics import ChosenTopics, ImageTopic
+from rgbd_kcf_tracker.recordings.topics import ChosenTopics, ImageTopic, base_name
 
 TRUTH_TOPICS = ('/groundtruth/visible', '/groundtruth/body')
 IMAGE, COMPRESSED = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CompressedImage'
@@ -38,7 +38,7 @@ def look_at_images(bag: RawBag) -> list[ImageTopic]:
 
 def look_at(bag: RawBag, topic: Topic) -> ImageTopic:
     """What the first message of an image topic tells of it."""
-    by_name = 'depth' if 'depth' in topic.name else 'color'
+    by_name = role_by_name(topic.name)
     try:
         msg = bag.message(topic, 0)
         if topic.type == IMAGE:
@@ -54,6 +54,13 @@ def look_at(bag: RawBag, topic: Topic) -> ImageTopic:
         return _look_at_compressed(topic, msg, by_name)
     except RgbdKcfError:
         return ImageTopic(topic.name, by_name)
+
+
+def role_by_name(name: str) -> str:
+    """Depth where a name says so, but for colour below a camera's name that does."""
+    own = '/'.join(base_name(name).rsplit('/', 2)[1:])
+    says_color = 'depth' not in own and ('color' in own or 'rgb' in own)
+    return 'color' if says_color or 'depth' not in name else 'depth'
 
 
 def _look_at_compressed(topic: Topic, msg: Any, by_name: str) -> ImageTopic:

@@ -24,6 +24,9 @@ Azure Kinect's 4096x3072 is the largest colour image of an RGB-D camera. A pictu
 many pixels takes seconds to unpack, from a message of a few kB.
 """
 MAX_SIDE = 1 << 16
+MOST_SCANS = 100
+"""Scans of a JPEG image, each of which goes through all of it: encoders make some ten, and a file
+could hold any number of empty ones."""
 
 _PNG_SIGNATURE = b'\x89PNG\r\n\x1a\n'
 _JPEG_SIGNATURE = b'\xff\xd8\xff'
@@ -140,6 +143,8 @@ def _jpeg(data: memoryview, max_pixels: int) -> tuple[Container, int, int]:
             bits, height, width, channels = struct.unpack_from('>BHHB', data, position + 2)
             break
         position += max(length, 2)
+    if bytes(data).count(b'\xff\xda') > MOST_SCANS:
+        raise ImageError(f'JPEG image has more than {MOST_SCANS} scans')
     if bytes(data[-64:]).find(b'\xff\xd9') < 0 and bytes(data).rfind(b'\xff\xd9') < 0:
         raise ImageError(f'JPEG image of {len(data)} bytes is cut off')
     return Container(JPEG, width, height, channels, bits), width * height, _JPEG_RATIO

@@ -12,7 +12,7 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE, inspect
 from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, listing, read_file
 from rgbd_kcf_tracker.recordings.images import (
     DepthImage,
@@ -37,6 +37,15 @@ def image_files(folder: Path) -> tuple[Path, ...]:
     if not found:
         raise RecordingError(f'{folder} holds no images (PNG, JPEG or TIFF)')
     return tuple(sorted(found, key=lambda p: natural_key(p.name)))
+
+
+def size_of(image: Path) -> tuple[int, int] | None:
+    """Width and height that an image file states in its head; None where it is none."""
+    try:
+        head = inspect(memoryview(read_file(image, MAX_IMAGE)), MAX_SIDE**2)
+    except ImageError:
+        return None
+    return head.width, head.height
 
 
 def missing_number(images: Sequence[Path], lines: int) -> Path | None:

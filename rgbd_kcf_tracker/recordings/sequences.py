@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.recordings.imagefiles import (
     even_stamps,
     image_files,
     missing_number,
+    size_of,
     unnumbered,
 )
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
@@ -144,7 +145,7 @@ class SequenceFolder(Closing):
             colors,
             () if no_depth else folder_depths(path, colors, warn),
             folder_stamps(path, colors, options.fps, warn),
-            options.intrinsics or folder_intrinsics(path),
+            options.intrinsics or folder_intrinsics(path, lambda: size_of(colors[0]), warn),
             options.max_pixels,
         )
         self.intrinsics: Intrinsics | None = self._files.intrinsics

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -51,7 +51,7 @@ def read_boxes(path: Path, flags: int = 0) -> list[Box | None]:
     """
     boxes: list[Box | None] = []
     for number, line in enumerate(read_lines(path), start=1):
-        fields = re.split(r'[,;\s]+', line.strip().strip(',;'))
+        fields = re.split(r'\s*[,;]\s*|\s+', line.strip().rstrip(',;'))
         try:
             values = [float(field) for field in fields]
             boxes.append(box_of_region(values[:4] if len(values) <= 4 + flags else values))
@@ -181,12 +181,21 @@ def _json_number(values: Mapping[str, Any], key: str) -> float:
         raise RecordingError(f'{key} is {str(values[key])[:20]!r}, no number of pixels') from None
 
 
-def folder_intrinsics(folder: Path) -> Intrinsics | None:
+def folder_intrinsics(
+    folder: Path,
+    size: Callable[[], tuple[int, int] | None],
+    warn: Callable[[str], None] | None = None,
+) -> Intrinsics | None:
     """The camera of a sequence folder, None where it states none.
 
     It is in ``intrinsics.json``, or else in ``camera_info.json``: the fields of
     ``sensor_msgs/CameraInfo``, ``D``, ``K`` and ``P`` in small or capital letters, and
     ``rectified``, true where the images are.
+
+    Args:
+        folder: the folder.
+        size: looks up width and height of its images; None where they cannot be known.
+        warn: is told in words where the camera is one for images of another size, and left out.
 
     Raises:
         RecordingError: where a file holds no camera.
@@ -200,18 +209,24 @@ def folder_intrinsics(folder: Path) -> Intrinsics | None:
     try:
         fields = {name.lower(): value for name, value in _json_object(text).items()}
         roi = fields.pop('roi', None) or {}
-        rectified = YES if fields.pop('rectified', False) else NO
+        rectified = fields.pop('rectified', False)
+        if not isinstance(rectified, bool):
+            raise RecordingError(f'rectified is {rectified!r}, neither true nor false')
         if 'k' not in fields:
             raise RecordingError('K is missing')
         if not isinstance(roi, dict):
             raise RecordingError('roi is no JSON object')
         told = SimpleNamespace(**({'p': [0.0] * 12} | fields | {'roi': SimpleNamespace(**roi)}))
-        found = camera_from_info(told, rectified=rectified)
+        found = camera_from_info(told, rectified=YES if rectified else NO)
     except RgbdKcfError as error:
         raise RecordingError(
             f'{path} holds no camera ({error}): write the fields of CameraInfo, or {INTRINSICS}'
         ) from None
-    return None if found is None else found.intrinsics
+    shown = size()
+    misfit = '' if found is None or shown is None else found.misfit(*shown)
+    if misfit and warn is not None:
+        warn(f'{path.name} {misfit}: left out')
+    return None if found is None or misfit else found.intrinsics
 
 
 def read_lines(path: Path) -> list[str]:

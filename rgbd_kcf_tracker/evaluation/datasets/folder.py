@@ -36,6 +36,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.imagefiles import (
     ImageFrames,
     image_files,
+    size_of,
 )
 from rgbd_kcf_tracker.recordings.mot import MOT_FILE, REGION_ID, read_mot
 from rgbd_kcf_tracker.recordings.sequences import (
@@ -279,4 +280,5 @@ def read_frames(
         lost = images[depths.index(None)]
         raise DatasetError(f'{path / "depth"} has no image for {lost}: give each frame a depth')
     stamps = folder_stamps(path, images, fps, warn or (lambda text: None))
-    return ImageFrames(images, depths, stamps, folder_intrinsics(path))
+    camera = folder_intrinsics(path, lambda: size_of(images[0]), warn)
+    return ImageFrames(images, depths, stamps, camera)
