@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+import bz2
 import dataclasses
 import os
+import re
 import shutil
 import signal
 import sqlite3
+import struct
 import subprocess
 import sys
 import time
@@ -198,6 +201,48 @@ def test_types_that_ros_2_lacks_or_changed_come_along_from_ros_1(tmp_path: Path)
     assert (found[0].parts[0].good, found[0].parts[0].age.sec) == (True, 7)
     assert found[1].transforms[0].transform.translation.z == 3
     assert (found[2].text, found[2].pose.position.y, found[2].texture_resource) == ('words', 2, '')
+
+
+@pytest.mark.parametrize('policy', ['transient_local', '1'])
+@pytest.mark.parametrize('kind', ['mcap', 'sqlite3'])
+def test_convert_keeps_the_qos_of_topics(kind: str, policy: str, tmp_path: Path) -> None:
+    """Without it, a replayed /tf_static no longer reaches those who come late."""
+    qos = f'- history: 1\n  depth: 1\n  durability: {policy}\n'
+    if kind == 'mcap':
+        path = tmp_path / 'a.mcap'
+        with McapWriter(path) as writer:
+            for s in camera_messages(FRAMES):
+                data = ROS2.serialize_cdr(s.message, s.type)
+                writer.write_raw(
+                    s.topic, s.type, data, s.log_ns, qos=qos if s.topic == INFO else ''
+                )
+    else:
+        path = WRITERS['db3'](tmp_path, camera_messages(FRAMES))
+        with closing(sqlite3.connect(path)) as opened:
+            opened.execute('UPDATE topics SET offered_qos_profiles = ? WHERE name = ?', (qos, INFO))
+            opened.commit()
+    bag = RawBag(path)
+    copy_bag(bag, tmp_path / 'out.mcap')
+    bag.close()
+    with (tmp_path / 'out.mcap').open('rb') as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    found = {c.topic: c.metadata['offered_qos_profiles'] for c in summary.channels.values()}
+    assert found.pop(INFO) == '- history: 1\n  depth: 1\n  durability: transient_local\n'
+    assert set(found.values()) <= {'', '[]'}
+
+
+def test_messages_of_a_second_type_of_a_topic_are_told(tmp_path: Path) -> None:
+    sent = camera_messages(FRAMES)
+    (tmp_path / 'a').mkdir()
+    write_mcap(tmp_path / 'a' / 'a_0.mcap', sent)
+    infos = [dataclasses.replace(s, topic=COLOR) for s in sent if s.topic == INFO]
+    write_mcap(tmp_path / 'a' / 'a_1.mcap', infos)
+    bag = RawBag(tmp_path / 'a')
+    bag.close()
+    assert len(bag.topics[COLOR]) == 6
+    (warning,) = (w for w in bag.warnings if 'left out' in w)
+    assert f'6 messages of {COLOR} are left out' in warning
 
 
 # -- encodings through a bag -------------------------------------------------------------------
@@ -502,6 +547,9 @@ def test_topics_that_are_not_in_cdr_are_listed_as_left_out(kind: str, tmp_path: 
             opened.commit()
     with pytest.raises(RecordingError, match=rf"{COLOR} \(in 'json', not in cdr: left out\)"):
         read(path)
+    bag = RawBag(path)
+    bag.close()
+    assert sum("'json'" in w for w in bag.warnings) == (1 if kind == 'mcap' else 3)
 
 
 @pytest.mark.parametrize(
@@ -575,6 +623,7 @@ def test_a_bag_cut_off_anywhere_gives_what_is_whole(kind: str, tmp_path: Path) -
         bag = RawBag(cut)
         counts.append(sum(len(t) for t in bag.topics.values()))
         assert any('cut off or not closed' in w for w in bag.warnings)
+        assert not any(w.endswith('read up to there') for w in bag.warnings)
         bag.close()
         if counts[-1] >= 3:
             frames, warnings = read(cut)
@@ -675,6 +724,73 @@ def test_a_damaged_chunk_costs_what_is_in_it(kind: str, tmp_path: Path) -> None:
     assert len(whole) >= 5
     by_stamp = {f.stamp_ns: f for f in frames}
     assert_same_frames(whole, [by_stamp[f.stamp_ns] for f in whole])
+
+
+@pytest.mark.parametrize(
+    ('kind', 'packed'), [('mcap zstd', b'\x28\xb5\x2f\xfd'), ('ROS 1 lz4', b'\x04\x22\x4d\x18')]
+)
+def test_a_damaged_first_chunk_costs_no_other(kind: str, packed: bytes, tmp_path: Path) -> None:
+    """The topics stand in the first chunk and, where the file was closed, at its end once more."""
+    frames = make_frames(8, (320, 240))
+    path = WRITERS[kind](tmp_path, camera_messages(frames))
+    path.write_bytes(path.read_bytes().replace(packed, bytes(4), 1))
+    bag = RawBag(path)
+    count, _ = copy_bag(bag, tmp_path / 'mended.mcap')
+    assert sum('chunk at byte' in w for w in bag.warnings) == 1
+    bag.close()
+    assert 15 <= count < 24
+
+
+@pytest.mark.parametrize('place', [0, 8, 100, 1 << 40, (1 << 64) - 1])
+def test_a_summary_that_is_elsewhere_does_no_harm(place: int, tmp_path: Path) -> None:
+    path = write_mcap(tmp_path / 'a.mcap', camera_messages(FRAMES))
+    data = path.read_bytes()
+    path.write_bytes(data[:-28] + place.to_bytes(8, 'little') + data[-20:])
+    assert read(path)[1] == []
+    path = write_ros1(tmp_path / 'a.bag', camera_messages(FRAMES))
+    begin, name, rest = path.read_bytes().partition(b'index_pos=')
+    path.write_bytes(begin + name + place.to_bytes(8, 'little') + rest[8:])
+    assert_same_frames(read(path)[0], FRAMES)
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'ROS 1'])
+def test_a_damaged_record_in_a_chunk_is_told(kind: str, tmp_path: Path) -> None:
+    """A record that claims more than its chunk holds; what stands before it is read."""
+    path = WRITERS[kind](tmp_path, camera_messages(FRAMES))
+    bag = RawBag(path)
+    _, _, at, _ = bag.topics[COLOR].places[8:12]
+    bag.close()
+    data = bytearray(path.read_bytes())
+    # The highest byte of the length before the head of the message, or before its data.
+    data[at - (23 if kind == 'mcap' else 1)] = 0x7F
+    path.write_bytes(data)
+    bag = RawBag(path)
+    bag.close()
+    assert 0 < len(bag.topics[COLOR]) < len(FRAMES)
+    (warning,) = bag.warnings
+    assert re.search(r'the chunk at byte \d+ is damaged, and read up to there$', warning)
+
+
+@pytest.mark.parametrize('kind', ['mcap', 'ROS 1'])
+def test_packed_zeros_are_no_records(kind: str, tmp_path: Path) -> None:
+    """A file of 1 kB claimed millions of empty records, and was looked through for minutes."""
+    size = 1 << 24
+    packed = bz2.compress(bytes(size))
+    if kind == 'mcap':
+        length = struct.pack('<Q', len(packed))
+        body = struct.pack('<QQQIL', 0, 0, size, 0, 3) + b'bz2' + length + packed
+        chunk = struct.pack('<BQ', 6, len(body)) + body
+        data = b'\x89MCAP0\r\n' + chunk
+    else:
+        values = (b'op=\5', b'compression=bz2', b'size=' + struct.pack('<L', size))
+        head = b''.join(struct.pack('<L', len(v)) + v for v in values)
+        chunk = struct.pack('<L', len(head)) + head + struct.pack('<L', len(packed)) + packed
+        data = b'#ROSBAG V2.0\n' + chunk
+    path = tmp_path / 'a'
+    path.write_bytes(data)
+    bag = RawBag(path)
+    bag.close()
+    assert any(w.endswith('is damaged, and read up to there') for w in bag.warnings)
 
 
 def test_missing_index(tmp_path: Path) -> None:

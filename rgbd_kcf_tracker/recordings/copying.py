@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -22,6 +23,12 @@ from rgbd_kcf_tracker.recordings.rawbag import RawBag, typestore
 from rgbd_kcf_tracker.recordings.recording import Recording
 from rgbd_kcf_tracker.recordings.storage import Definition
 from rgbd_kcf_tracker.recordings.topics import base_name
+
+_POLICIES = {
+    'reliability': {'0': 'system_default', '1': 'reliable', '2': 'best_effort'},
+    'durability': {'0': 'system_default', '1': 'transient_local', '2': 'volatile'},
+    'liveliness': {'0': 'system_default', '1': 'automatic', '3': 'manual_by_topic'},
+}
 
 T = TypeVar('T')
 Progress = Callable[[Iterable[T], int], Iterable[T]]
@@ -128,9 +135,22 @@ def copy_bag(
             except RecordingError as error:
                 warnings.append(f'message {index} of {topic.name} is left out: {error}')
                 continue
-            writer.write_raw(topic.name, kind, data, topic.log_ns[index], definition)
+            qos = _named(bag.qos.get(topic.name, ''))
+            writer.write_raw(topic.name, kind, data, topic.log_ns[index], definition, qos)
             count += 1
     return count, warnings
+
+
+def _named(qos: str) -> str:
+    """Profiles with names for the numbers that rosbag2 wrote before Jazzy.
+
+    An mcap file does not say which it holds, and without ``metadata.yaml`` Jazzy expects names.
+    """
+
+    def name(found: re.Match[str]) -> str:
+        return f'{found[1]}: {_POLICIES[found[1]].get(found[2], found[2])}'
+
+    return re.sub(rf'\b({"|".join(_POLICIES)}): (\d+)\b', name, qos)
 
 
 class _Passer:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -27,6 +27,8 @@ from rgbd_kcf_tracker.recordings.storage import CACHED_CHUNKS, HEAD, Definition,
 
 MAGIC = b'\x89MCAP0\r\n'
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 0x03, 0x04, 0x05, 0x06, 0x0F
+_FOOTER = struct.Struct('<BQQQI')
+_FOOTER_BEGIN = struct.pack('<BQ', 0x02, 20)
 _RECORD = struct.Struct('<BQ')
 _MESSAGE_HEAD = struct.Struct('<HIQQ')
 _CHUNK_HEAD = struct.Struct('<QQQI')
@@ -72,6 +74,7 @@ class McapStorage:
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
         self.warnings: list[str] = []
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str]] = {}
@@ -88,6 +91,7 @@ class McapStorage:
 
     def scan(self) -> Iterator[Scanned]:
         """See :meth:`Storage.scan`."""
+        self._read_summary()
         at, end = len(MAGIC), self._file.size
         while at + _RECORD.size <= end:
             opcode, length = _RECORD.unpack(self._file.read(at, _RECORD.size))
@@ -98,7 +102,7 @@ class McapStorage:
                     return
                 break
             if opcode == _CHUNK:
-                yield from self._chunk(body, min(length, end - body))
+                yield from self._chunk(body, length)
             elif opcode == 0:
                 break
             elif at <= end:
@@ -108,6 +112,33 @@ class McapStorage:
         self.warnings.append(
             f'{self.path} was cut off or not closed: all whole messages in it are read'
         )
+
+    def _read_summary(self) -> None:
+        """Schemas and channels as a closed file repeats them at its end.
+
+        Mostly they stand in the first chunk alone, and damage there would cost all messages.
+        """
+        end = self._file.size - len(MAGIC) - _FOOTER.size
+        if end < len(MAGIC):
+            return
+        foot = self._file.read(end, _FOOTER.size + len(MAGIC))
+        if not foot.startswith(_FOOTER_BEGIN) or not foot.endswith(MAGIC):
+            return
+        at = _FOOTER.unpack_from(foot)[2]
+        while len(MAGIC) <= at <= end - _RECORD.size:
+            opcode, length = _RECORD.unpack(self._file.read(at, _RECORD.size))
+            body = at + _RECORD.size
+            at = body + length
+            # What no summary holds: the place of it is wrong.
+            if at > end or opcode in (0, _MESSAGE, _CHUNK, _DATA_END):
+                return
+            if opcode in (_SCHEMA, _CHANNEL):
+                self._describe(opcode, self._file.read(body, length))
+
+    def _warn(self, text: str) -> None:
+        """Say it once, however often the file repeats what it is about."""
+        if text not in self.warnings:
+            self.warnings.append(text)
 
     def read(self, where: Where) -> bytes:
         """See :meth:`Storage.read`."""
@@ -152,7 +183,10 @@ class McapStorage:
         where = (-1 if chunk is None else chunk, body + start, length - start)
         return Scanned(topic, kind, log_ns, head[start:], where)
 
-    def _chunk(self, body: int, available: int) -> Iterator[Scanned]:
+    def _chunk(self, body: int, length: int) -> Iterator[Scanned]:
+        available = min(length, self._file.size - body)
+        cut_off = available < length  # of which the scan warns
+        damaged = f'{self.path}: the chunk at byte {body} is damaged, and read up to there'
         head = self._file.read(body, min(available, _CHUNK_HEAD.size + 64))
         try:
             _, _, size, crc = _CHUNK_HEAD.unpack_from(head)
@@ -161,12 +195,16 @@ class McapStorage:
             method = head[_CHUNK_HEAD.size + 4 : at].decode('ascii')
             (packed,) = struct.unpack_from('<Q', head, at)
         except (struct.error, UnicodeDecodeError):
+            if not cut_off:
+                self.warnings.append(damaged)
             return
         data = body + at + 8
         whole = packed <= available - at - 8
         packed = min(packed, available - at - 8)
         if method == '':
-            yield from self._inside(self._file, data, data + packed, None)
+            whole = yield from self._inside(self._file, data, data + packed, None)
+            if not whole and not cut_off:
+                self.warnings.append(damaged)
             return
         self._chunks[body] = (method, data, packed, size, crc)
         try:
@@ -176,27 +214,30 @@ class McapStorage:
                 memory = Unpacker(method, self._file.read(data, packed), size)
             else:
                 memory = _Memory(self._unpacked(body))
-            yield from self._inside(memory, 0, memory.size, body)
+            whole = yield from self._inside(memory, 0, memory.size, body)
+            if not whole and not cut_off:
+                self.warnings.append(damaged)
         except RecordingError as error:
-            self.warnings.append(
-                f'{self.path}: the chunk at byte {body} is damaged, and read up to there: {error}'
-            )
+            self.warnings.append(f'{damaged}: {error}')
 
     def _inside(
         self, source: _File | _Memory | Unpacker, at: int, end: int, chunk: int | None
-    ) -> Iterator[Scanned]:
-        while at + _RECORD.size <= end:
+    ) -> Generator[Scanned, None, bool]:
+        """The messages of a chunk; whether it holds whole records up to its end."""
+        while at < end:
             head = source.read(at, _RECORD.size)
             if len(head) < _RECORD.size:
-                return
+                return False
             opcode, length = _RECORD.unpack(head)
             body = at + _RECORD.size
             at = body + length
-            if at > end:
-                return
+            # No record is empty, but packed zeros would be millions of them in a few bytes.
+            if at > end or opcode == 0 or length == 0:
+                return False
             scanned = self._record(opcode, source, body, length, chunk)
             if scanned is not None:
                 yield scanned
+        return True
 
     def _describe(self, opcode: int, data: bytes) -> None:
         stream = ReadDataStream(BytesIO(data))
@@ -210,11 +251,11 @@ class McapStorage:
                 return
             channel = Channel.read(stream)
         except Exception:
-            self.warnings.append(f'{self.path}: a damaged description of a topic is left out')
+            self._warn(f'{self.path}: a damaged description of a topic is left out')
             return
         if channel.message_encoding != 'cdr':
             self.left_out[channel.topic] = channel.message_encoding
-            self.warnings.append(
+            self._warn(
                 f'{self.path}: topic {channel.topic} is in {channel.message_encoding!r}, '
                 'not in cdr, and is left out'
             )
@@ -222,6 +263,8 @@ class McapStorage:
         kind = self._schemas.get(channel.schema_id, '')
         self._channels[channel.id] = (channel.topic, kind)
         self.topics[channel.topic] = kind
+        if profiles := channel.metadata.get('offered_qos_profiles'):
+            self.qos[channel.topic] = profiles
 
     def _unpack(self, chunk: int) -> bytes:
         method, at, length, size, crc = self._chunks[chunk]

@@ -82,6 +82,7 @@ class McapWriter(FrameWriter):
         data: bytes | memoryview,
         log_ns: int,
         definition: Definition | None = None,
+        qos: str = '',
     ) -> None:
         """Write a message that is CDR already.
 
@@ -91,6 +92,8 @@ class McapWriter(FrameWriter):
             data: the serialised message.
             log_ns: time of recording; MCAP has none before 1970, and takes 1970 for it.
             definition: text of the type; needed for types that ROS 2 Jazzy does not bring.
+            qos: profiles of the topic's publishers as rosbag2 writes them, for whoever replays it;
+                the first message's count.
 
         Raises:
             RecordingError: where it cannot be written.
@@ -101,7 +104,7 @@ class McapWriter(FrameWriter):
         try:
             channel = self._channels.get(topic)
             if channel is None:
-                channel = self._register(topic, kind, definition)
+                channel = self._register(topic, kind, definition, qos)
             number = self._counts[topic] = self._counts.get(topic, -1) + 1
             self._writer.add_message(
                 channel, log_ns, cast(bytes, data), publish_time=log_ns, sequence=number
@@ -140,12 +143,12 @@ class McapWriter(FrameWriter):
             raise RecordingError(cannot_write(self.path, error)) from None
         self.output.end(whole=whole, anything=bool(self._counts))
 
-    def _register(self, topic: str, kind: str, definition: Definition | None) -> int:
+    def _register(self, topic: str, kind: str, definition: Definition | None, qos: str) -> int:
         if definition is None or definition.encoding == 'ros1msg':
             definition = Definition('ros2msg', definition_text(kind))
         schema = self._writer.register_schema(kind, definition.encoding, definition.text.encode())
         channel = self._writer.register_channel(
-            topic, 'cdr', schema, metadata={'offered_qos_profiles': ''}
+            topic, 'cdr', schema, metadata={'offered_qos_profiles': qos}
         )
         self._channels[topic] = channel
         return channel

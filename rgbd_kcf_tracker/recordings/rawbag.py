@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from heapq import merge
 from pathlib import Path
@@ -45,6 +46,7 @@ class RawBag:
         definitions: texts of message types, as far as the bag holds them.
         ros1: the messages are in ROS 1 serialisation.
         left_out: name to serialisation of topics that are not read.
+        qos: name to the profiles of its publishers, as rosbag2 writes them, where known.
         warnings: what was odd.
 
     Raises:
@@ -54,6 +56,7 @@ class RawBag:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.left_out: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
         self.warnings: list[str] = []
         self.definitions: dict[str, Definition] = {}
         self._temporary: tempfile.TemporaryDirectory[str] | None = None
@@ -127,12 +130,14 @@ class RawBag:
 
     def _scan(self) -> dict[str, Topic]:
         topics: dict[str, Topic] = {}
+        others: Counter[str] = Counter()
         for number, storage in enumerate(self._storages):
             for message in storage.scan():
                 topic = topics.get(message.topic)
                 if topic is None:
                     topic = topics[message.topic] = Topic(message.topic, message.type)
                 if topic.type != message.type:
+                    others[topic.name] += 1
                     continue
                 topic.add(number, message, storage.ros1)
                 if self._message_method:
@@ -145,7 +150,13 @@ class RawBag:
                 topics.setdefault(name, Topic(name, kind))
             self.definitions.update(storage.definitions)
             self.left_out |= storage.left_out
+            self.qos |= storage.qos
             self.warnings += storage.warnings
+        for name, count in others.items():
+            self.warnings.append(
+                f'{self.path}: {count} messages of {name} are left out: '
+                f'they are of another type than its first, {topics[name].type}'
+            )
         for topic in topics.values():
             topic.sort()
         return dict(sorted(topics.items()))

@@ -50,6 +50,7 @@ class Ros1Storage:
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
         self.warnings: list[str] = []
         self._connections: dict[int, tuple[str, str]] = {}
         # Place of a packed chunk's data: method, their length, unpacked length.
@@ -75,10 +76,12 @@ class Ros1Storage:
             fields, body, length = record
             operation = _operation(fields)
             whole = body + length <= self._size
-            if operation == _BAG:
-                indexed = int.from_bytes(fields.get(b'index_pos', b''), 'little') > 0
+            if operation == _BAG and not indexed:
+                index = int.from_bytes(fields.get(b'index_pos', b''), 'little')
+                indexed = index > 0
+                self._read_index(index)
             elif operation == _CHUNK:
-                yield from self._chunk(fields, body, min(length, self._size - body))
+                yield from self._chunk(fields, body, length)
             elif whole:
                 scanned = self._record(None, operation, fields, body, length)
                 if scanned is not None:
@@ -92,6 +95,17 @@ class Ros1Storage:
         self.warnings.append(
             f'{self.path} was cut off or not closed: all whole messages in it are read'
         )
+
+    def _read_index(self, at: int) -> None:
+        """Connections as a closed bag repeats them: damage of their first chunk costs no topic."""
+        while len(MAGIC) <= at < self._size:
+            record = self._header(None, at, self._size)
+            if record is None or _operation(record[0]) != _CONNECTION:
+                return
+            fields, body, length = record
+            at = body + length
+            if at <= self._size:
+                self._connect(fields, self._at(body, length))
 
     def read(self, where: Where) -> bytes:
         """See :meth:`Storage.read`."""
@@ -111,7 +125,7 @@ class Ros1Storage:
         return self._file.read(length) or b''
 
     def _header(self, memory: bytes | None, at: int, end: int) -> tuple[Fields, int, int] | None:
-        """Fields of the record at a place, and place and length of its data; None if cut off."""
+        """Fields of the record at a place, place and length of its data; None if there is none."""
 
         def get(position: int, length: int) -> bytes:
             if memory is None:
@@ -135,6 +149,9 @@ class Ros1Storage:
                 return None
             fields[name] = value
             position += 4 + size
+        # Every record says what it is; packed zeros would be millions that do not.
+        if b'op' not in fields:
+            return None
         (data,) = _U32.unpack_from(raw, 4 + length)
         return fields, at + length + 8, data
 
@@ -161,6 +178,8 @@ class Ros1Storage:
         method = fields.get(b'compression', b'none').decode('ascii', 'replace')
         memory: bytes | None = None
         chunk: int | None = None
+        cut_off = body + length > self._size  # of which the scan warns
+        length = min(length, self._size - body)
         at, end = body, body + length
         if method != 'none':
             size = int.from_bytes(fields.get(b'size', b''), 'little')
@@ -175,6 +194,10 @@ class Ros1Storage:
         while at < end:
             record = self._header(memory, at, end)
             if record is None or record[1] + record[2] > end:
+                if not cut_off:
+                    self.warnings.append(
+                        f'{self.path}: the chunk at byte {body} is damaged, and read up to there'
+                    )
                 return
             inner, start, size = record
             scanned = self._record(chunk, _operation(inner), inner, start, size)

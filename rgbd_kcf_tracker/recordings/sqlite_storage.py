@@ -40,6 +40,7 @@ class SqliteStorage:
         self.topics: dict[str, str] = {}
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
+        self.qos: dict[str, str] = {}
         self.warnings: list[str] = []
         self._copy: tempfile.TemporaryDirectory[str] | None = None
         with open_file(path) as file:
@@ -110,6 +111,7 @@ class SqliteStorage:
         except _ERRORS as error:
             raise RecordingError(f'{self.path} is no rosbag2 database: {error}') from None
         self._read_definitions()
+        self._read_qos()
         try:
             for number, topic, log_ns, length, data in self._rows():
                 if topic in names and isinstance(data, bytes) and isinstance(log_ns, int):
@@ -140,6 +142,16 @@ class SqliteStorage:
                     self.definitions[kind] = Definition(encoding, text)
         except _ERRORS:
             return  # the table is there from Iron on
+
+    def _read_qos(self) -> None:
+        try:
+            for name, text in self._database.execute(
+                'SELECT name, offered_qos_profiles FROM topics'
+            ):
+                if isinstance(text, str) and text and name in self.topics:
+                    self.qos[name] = text
+        except _ERRORS:
+            return  # the column is there from Foxy on
 
     def read(self, where: Where) -> bytes:
         """See :meth:`Storage.read`."""

@@ -62,6 +62,8 @@ class Storage(Protocol):
         topics: name to type of all topics, also those without messages; filled by :meth:`scan`.
         definitions: by type, as far as the file holds them; filled by :meth:`scan`.
         left_out: name to serialisation of topics that are not read; filled by :meth:`scan`.
+        qos: name to the profiles of its publishers, as rosbag2 writes them (YAML), as far as the
+            file holds them; filled by :meth:`scan`.
         warnings: what was odd; filled by :meth:`scan`.
     """
 
@@ -70,6 +72,7 @@ class Storage(Protocol):
     topics: dict[str, str]
     definitions: dict[str, Definition]
     left_out: dict[str, str]
+    qos: dict[str, str]
     warnings: list[str]
 
     def scan(self) -> Iterator[Scanned]:
