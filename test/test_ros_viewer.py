@@ -342,6 +342,16 @@ def test_the_room_has_the_camera_that_the_tracker_is_told_of(rectified: str, foc
         assert node._camera.intrinsics.fx == focal
 
 
+def shown_by(node: ViewerNode, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, bool]]:
+    """Stamps of the images that a watched page is given from now on, and whether with depth."""
+    node.page.board.watch(lambda: None)
+    shown: list[tuple[int, bool]] = []
+    monkeypatch.setattr(  # due at any time
+        node.page, 'image', lambda frame, stamp: shown.append((stamp, frame.depth is not None))
+    )
+    return shown
+
+
 @pytest.mark.usefixtures('rig')
 @pytest.mark.parametrize('answers_after', [None, 0, 1, 3])
 def test_images_are_shown_as_they_come(
@@ -349,11 +359,7 @@ def test_images_are_shown_as_they_come(
 ) -> None:
     """With nobody who answers, and with a tracker that answers so many images later."""
     with made_viewer() as node:
-        node.page.board.watch(lambda: None)
-        shown: list[tuple[int, bool]] = []
-        monkeypatch.setattr(  # due at any time
-            node.page, 'image', lambda frame, stamp: shown.append((stamp, frame.depth is not None))
-        )
+        shown = shown_by(node, monkeypatch)
         color, depth, _ = scene(0)
         headers = [Header(stamp=stamp_from_ns(number * 16_000_000)) for number in range(1, 21)]
         for number, header in enumerate(headers):
@@ -372,11 +378,7 @@ def test_images_go_on_at_the_rate_of_the_camera_when_depth_stops(
 ) -> None:
     """Those that would wait for it wait once; when it comes again it is shown again."""
     with made_viewer() as node:
-        node.page.board.watch(lambda: None)
-        shown: list[tuple[int, bool]] = []
-        monkeypatch.setattr(  # due at any time
-            node.page, 'image', lambda frame, stamp: shown.append((stamp, frame.depth is not None))
-        )
+        shown = shown_by(node, monkeypatch)
         color, depth, _ = scene(0)
         for number in range(40):
             header = Header(stamp=stamp_from_ns(number * 33_000_000))

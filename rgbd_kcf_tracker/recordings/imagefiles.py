@@ -12,7 +12,7 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE, inspect
+from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE, Container, inspect
 from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, listing, read_file
 from rgbd_kcf_tracker.recordings.images import (
     DepthImage,
@@ -39,10 +39,19 @@ def image_files(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(found, key=lambda p: natural_key(p.name)))
 
 
+def head_of(image: Path) -> Container:
+    """What an image file states in its head, whatever its size.
+
+    Raises:
+        ImageError: where it is no image.
+    """
+    return inspect(memoryview(read_file(image, MAX_IMAGE)), MAX_SIDE**2)
+
+
 def size_of(image: Path) -> tuple[int, int] | None:
     """Width and height that an image file states in its head; None where it is none."""
     try:
-        head = inspect(memoryview(read_file(image, MAX_IMAGE)), MAX_SIDE**2)
+        head = head_of(image)
     except ImageError:
         return None
     return head.width, head.height

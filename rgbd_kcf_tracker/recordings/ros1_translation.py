@@ -71,8 +71,7 @@ class Ros1Translator:
         Raises:
             RecordingError: where it is damaged, or no reader would take it.
         """
-        translated = self.data(kind, data)
-        found = self._found[kind]
+        translated, found = self.data(kind, data), self.type_of(kind)
         assert found is not None
         try:
             self._to.deserialize_cdr(translated, found[0])

@@ -14,12 +14,11 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-from rgbd_kcf_tracker.recordings.containers import MAX_SIDE, inspect
-from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, read_file
 from rgbd_kcf_tracker.recordings.imagefiles import (
     ImageFrames,
     depths_beside,
     even_stamps,
+    head_of,
     image_files,
     missing_number,
     size_of,
@@ -238,7 +237,7 @@ class SequenceFolder(Closing):
 
 def _stream(name: str, paths: Sequence[Path], rate: float | None, role: str) -> StreamInfo:
     try:
-        head = inspect(memoryview(read_file(paths[0], MAX_IMAGE)), MAX_SIDE**2)
+        head = head_of(paths[0])
     except ImageError as error:
         return StreamInfo(name, 'images', len(paths), rate, None, str(error), role)
     encoding = f'{head.name} {head.channels}x{head.bits} bit'

@@ -133,9 +133,8 @@ class DepthAwareTracker(ABC):
         if (frame.width, frame.height) != self._image_size:
             self._rescale(frame, self._model)
         interval = frame.seconds_since(self._stamp_ns, 0.0, _LONGEST_INTERVAL_S)
-        self._unseen_ns += max(
-            frame.stamp_ns - self._stamp_ns, 0
-        )  # stamps may go back, as in a loop
+        # Stamps may go back, as in a loop.
+        self._unseen_ns += max(frame.stamp_ns - self._stamp_ns, 0)
         self._stamp_ns = frame.stamp_ns
         found = self._follow(frame, self._model, interval)
         if found is not None:

@@ -211,14 +211,12 @@ class Crowd:
             opens: takes what turns out to be somebody out of the room.
         """
         self.time = time
-        self._frames = 1 if isinstance(scene.motion, Lost) else self._frames + 1
+        self._frames += 1
         if isinstance(scene.motion, Lost):
             self._mix_ups = MixUps()
-            for person in self.people:
-                person.mobile, person.last, person.hidden = False, None, False
-        if scene.view.shape != self._shape:
-            # The pixels of a picture of another size are no places in this one, and the room begins
-            # anew, with whoever has no person's shape.
+        if isinstance(scene.motion, Lost) or scene.view.shape != self._shape:
+            # The pixels of before are no places in this picture, and the room begins anew, with
+            # whoever has no person's shape.
             self._shape, self._frames = scene.view.shape, 1
             for person in self.people:
                 person.mobile, person.last, person.hidden = False, None, False
