@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Callable
 
 import cv2
@@ -92,7 +93,7 @@ from rgbd_kcf_tracker.metric.perceive.upright import person_sized
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
-from rgbd_kcf_tracker.track import Track
+from rgbd_kcf_tracker.track import Track, TrackState
 
 # -- looks ----------------------------------------------------------------------------------------
 
@@ -982,6 +983,17 @@ def test_who_was_hidden_for_a_moment_is_somebody_else_where_place_and_looks_toge
         assert not comeback.denied, 'nothing was heard yet'
         assert comeback.hear(red, {}, 0.0, 10.0).looks > 0.9
         assert comeback.denied == (place and odds < -1.1)
+
+
+@pytest.mark.parametrize('odds', [-0.35, -0.45])
+def test_of_who_came_back_no_box_is_shown_by_three_to_two_against_him(odds: float):
+    red = look(RED)
+    person, _ = returned(red)
+    comeback = Comeback(person, 10.0, person.gallery.log_odds(red) - odds)
+    assert not comeback.doubted, 'nothing was heard yet'
+    comeback.hear(red, {}, 0.0, 10.0)
+    assert comeback.doubted == (odds < -0.4)  # log(2/3) is -0.405
+    assert not comeback.denied
 
 
 # -- everyone together ----------------------------------------------------------------------------
@@ -2529,6 +2541,23 @@ def test_after_a_pause_nobody_is_the_target_at_once():
         taken.append(person.seen_at > known)
     assert not any(taken[:3])
     assert taken[-1]
+
+
+def test_who_is_rather_somebody_else_is_followed_without_a_box_until_his_looks_bear_him_out():
+    """Strangers who came where the target had left were shown with scores of 0.2 for seconds."""
+    targets, number, person = followed()
+    comeback, now = Comeback(person, 0.8, 0.0), 0.8
+    targets._followers[number]._comeback = comeback
+    for against, shown in ((0.0, True), (6.0, False), (0.0, True)):
+        comeback._new = math.exp(against)
+        for _ in range(3):
+            now += 0.1
+            track = targets.update(picture([Someone(0.0, 3.0)], now))[number]
+            assert (track.box is not None) == shown
+            assert person.seen_at == pytest.approx(now - 0.1), 'he is followed on'
+        if not shown:
+            assert track.state is TrackState.OCCLUDED
+            assert track.predicted is None, 'where he is, the target is hardly'
 
 
 def back_again(*shown: tuple[list[Someone], Box | None]) -> list[Track]:

@@ -265,6 +265,8 @@ class Follower:
             return self._tracked(frame, box, score, whole.depth, self._belief())
         box = surface.take(account.scene, found)
         self.seen = found.seen
+        if self._comeback is not None and self._comeback.doubted:
+            return Track(None, self._unseen(dt))  # a box on a stranger is worse than none
         outline = box_about(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
         if self.person is not None and score >= LEARNED:
@@ -545,11 +547,14 @@ class Follower:
 
     # -- answers ----------------------------------------------------------------------------------
 
+    def _unseen(self, dt: float) -> TrackState:
+        gone = self._hidden_for + dt
+        return TrackState.LOST if gone > self._parameters.lost_after else TrackState.OCCLUDED
+
     def _hidden(self, frame: Frame, dt: float) -> Track:
-        hidden = self._hidden_for + dt
-        state = TrackState.LOST if hidden > self._parameters.lost_after else TrackState.OCCLUDED
+        state = self._unseen(dt)
         belief = None
-        if self._surface is not None and hidden <= self._parameters.predict_for:
+        if self._surface is not None and self._hidden_for + dt <= self._parameters.predict_for:
             belief = in_metres(self._surface.belief(), frame)
         if belief is None:
             return Track(None, state)

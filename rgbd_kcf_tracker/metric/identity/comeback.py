@@ -25,6 +25,10 @@ as much as it takes to say the contrary
 EVEN = 0.5
 """Probability below which who came back is rather somebody else than the target: no box is shown of
 him, and what was learned of him does not stay."""
+DOUBTED = 0.4
+"""Probability below which no box is shown any more of who came back, though he is followed on, as
+his looks may yet bear him out: 3 to 2 against him, not even odds, as he was shown from those on and
+looks a little otherwise in each frame."""
 DISOWNED = 0.25
 """Probability that who came back is the target, by looks alone or with what his place said then,
 below which he is somebody else after all: 3 to 1, as he was taken once already, on more than
@@ -145,6 +149,11 @@ class Comeback:
         if self._place and likely.score < DISOWNED:
             return True
         return likely.looks < max(DISOWNED, likely.rival)
+
+    @property
+    def doubted(self) -> bool:
+        """Whether who came back is so likely somebody else that no box of him is shown."""
+        return self.likely is not None and self.likely.score < DOUBTED
 
     @property
     def odds(self) -> float:
