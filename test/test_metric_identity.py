@@ -1642,6 +1642,20 @@ def test_who_shows_at_the_end_of_depth_is_not_meant_by_a_box_that_lies_mostly_be
     assert surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters()) is None
 
 
+@pytest.mark.parametrize(('told', 'taken'), [(20, False), (34, True)])
+def test_what_shows_in_less_than_half_of_a_box_where_depth_ends_is_not_what_it_is_about(
+    told: int, taken: bool
+):
+    """A strip of who stood behind, in the third of the box that depth reached, was the target."""
+    color, depth = images([])
+    box = Box(40, 30, 60, 100)
+    depth[:, : 100 - told] = np.nan
+    depth[50:130, 100 - told : 100] = 3.2
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), box, MetricParameters())
+    assert (seen is not None) == taken
+
+
 @pytest.mark.parametrize('broad', [True, False])
 def test_what_has_no_shape_of_a_person_is_not_followed_whole_for_a_part_of_it(broad: bool):
     depth = np.full((ROWS, COLS), WALL, np.float32)
@@ -2035,6 +2049,26 @@ def test_who_was_drawn_where_depth_shows_nothing_is_known_when_he_comes_back(
         assert track.box.iou(one.box) > 0.8
 
 
+def test_who_is_known_again_is_followed_once_more_than_a_strip_of_him_shows(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """A strip past somebody else was all of him from then on, and he was lost in full view."""
+    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    tracker = create_tracker('metric')
+    for i in range(14):
+        one = Someone(0.8 - 0.15 * max(i - 4, 0), 4.4 if i == 0 else 2.8)
+        color, depth = images([one] if i in (0, *range(4, 14)) else [])
+        depth[depth == WALL] = 3.9
+        if i == 7:  # in the frame in which enough is known, what is nearer leaves one leg of him
+            x, y = round(one.box.x) + 12, round(one.box.y) + 70
+            color[:y], color[:, x:], depth[:y], depth[:, x:] = GREY, GREY, 1.5, 1.5
+        depth[depth > 4] = np.nan
+        frame = Frame(color, depth, round(1e9 * i), CAMERA)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert track.box is not None
+    assert track.box.iou(one.box) > 0.8
+
+
 def test_of_two_who_come_where_the_target_was_it_is_the_one_in_its_colours(
     monkeypatch: pytest.MonkeyPatch,
 ):
@@ -2170,6 +2204,19 @@ def test_of_two_who_are_one_figure_at_first_the_one_that_was_drawn_about_is_the_
         assert track.box.iou(one.box) > 0.75
 
 
+@pytest.mark.parametrize('behind', [0.12, 0.1])
+def test_of_two_who_part_the_one_who_is_where_the_box_was_drawn_is_the_target(behind: float):
+    """He steps aside as well, so that the box is about him no more than by half."""
+    tracker = create_tracker('metric')
+    for i in range(8):
+        one, other = Someone(-behind - 0.05 * i, 3.0), Someone(0.15 * i, 2.94, GREEN, BLUE)
+        frame = picture([one, other], 0.1 * i)
+        drawn = Box.from_corners(one.box.x, one.box.y, other.box.x + 4, one.box.bottom)
+        track = tracker.start(frame, drawn) if i == 0 else tracker.update(frame)
+    assert track.box is not None
+    assert track.box.iou(one.box) > 0.8
+
+
 def test_both_of_two_who_are_one_figure_may_be_chosen():
     targets, numbers = TargetSet('metric'), []
     for i in range(14):
@@ -2240,6 +2287,30 @@ def test_who_was_half_hidden_when_he_was_chosen_is_followed_whole_once_he_shows(
         assert track.score > 0.9
     assert targets.metric.person(number) is person
     assert not any(view is half for view in person.gallery.views for half in halves)
+
+
+def test_who_once_showed_whole_is_not_taken_for_a_part_when_he_is_half_hidden_again():
+    """What was known of her was dropped for a strip of her, and she was lost in full view."""
+    targets = MetricTargets(MetricParameters())
+    one = Someone(-0.1, 3.0)
+    beside = Box(one.box.cx, 0, 60, ROWS)
+    for i in range(8):
+        frame = picture([one], 0.1 * i, beside if i == 0 else None)
+        if i == 0:
+            half = Box.from_corners(one.box.x, one.box.y, beside.x, one.box.bottom)
+            number = targets.add(frame, half)
+        else:
+            targets.update(frame)
+    followed, account = targets._followers[number], targets.account
+    assert account is not None
+    whole = account.sights[0].figure.seen
+    mask = whole.mask.copy()
+    mask[:, mask.shape[1] // 3 :] = False
+    part = dataclasses.replace(whole, mask=mask, area=whole.area / 3)
+    followed._partial = True
+    assert followed._whole(account, part) is None
+    followed._shown = part.area
+    assert followed._whole(account, part) is whole
 
 
 @pytest.mark.parametrize('camera', ['noisy', 'noisy and stirs', 'repeats itself'])

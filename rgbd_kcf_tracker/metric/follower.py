@@ -32,7 +32,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, fits, surface_of
+from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import depth_step
@@ -113,7 +113,7 @@ class Follower:
         self._surface: BySurface | None = None
         self._account: Account | None = None
         self._hidden_for = self._unread_for = 0.0
-        self._partial = False
+        self._partial, self._shown = False, 0.0
         self._since = crowd.time
         self._elsewhere = Elsewhere()
         self._comeback: Comeback | None = None
@@ -265,6 +265,7 @@ class Follower:
             return self._tracked(frame, box, score, whole.depth, self._belief())
         box = surface.take(account.scene, found)
         self.seen = found.seen
+        self._shown = max(self._shown, found.seen.area)
         if self._comeback is not None and self._comeback.doubted:
             return Track(None, self._unseen(dt))  # a box on a stranger is worse than none
         outline = box_about(account.scene, found.seen)
@@ -382,14 +383,17 @@ class Follower:
         self.lose(time - comeback.left)
 
     def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:
-        """All of somebody of whom something hid a part when he was chosen, as soon as it shows."""
+        """All of somebody of whom something hid a part when he was chosen, as soon as it shows.
+
+        Who once showed that much is not a part, though he may be half hidden again.
+        """
         if not self._partial or account.time - self._since > MENDING:
             return None
         index = account.sight_of(seen)
         if index < 0:
             return None
         figure, owner = account.sights[index].figure, account.owner[index]
-        if figure.parted or figure.seen.area < MORE * seen.area:
+        if figure.parted or figure.seen.area < MORE * max(seen.area, self._shown):
             return None
         if not TALLER < figure.seen.height < HEIGHT[1] or figure.seen.width > WIDTH[1]:
             return None
@@ -408,7 +412,7 @@ class Follower:
         if box_about(scene, seen).iou(self._drawn) >= LOCK_IOU:
             return None
         for sight, owner in zip(account.sights, account.owner, strict=True):
-            if owner < 0 and box_about(scene, sight.figure.seen).iou(self._drawn) > SAME_OUTLINE:
+            if owner < 0 and box_about(scene, sight.figure.seen).iou(self._drawn) >= LOCK_IOU:
                 return sight.figure.seen
         return None
 
@@ -416,7 +420,7 @@ class Follower:
         assert self.person is not None
         self.person.gallery = Gallery()
         self._surface = BySurface(account, whole, self.person, self._parameters, self._cues)
-        self._partial = whole.cut.any
+        self._partial, self._shown = whole.cut.any, whole.area
         self.seen = whole
 
     def _belief(self) -> Belief | None:
@@ -539,7 +543,9 @@ class Follower:
         against = account.against * away(account.time - person.seen_at)
         others = math.exp(against) + account.as_others(person, index)
         score = mine / (sum(odds for odds, _ in likely.values()) + others)
+        # Nor is of a fragment seen past somebody else known how large he is, who is to be followed.
         enough = self._recognised(stranger, account.time) and stranger.upright
+        enough = enough and not sight.figure.seen.cut.top
         if not enough or sight.figure.parted or score < EVEN:
             return None
         self._comeback = Comeback(person, account.time, against)

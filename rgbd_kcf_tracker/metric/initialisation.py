@@ -53,9 +53,9 @@ anything no larger than a person: of less there is more between somebody's arms 
 SOMEBODY_FARTHER = 0.1
 """Share of the given box that shows somebody farther than what fills most of it, from which that
 may hide whom the box is about: less is seen between somebody's arms and legs."""
-LEAST_TOLD = 0.25
-"""Share of the given box's columns that depth reaches from which these tell what it is about: a leg
-and an arm of who stands where the depth image ends."""
+LEAST_TOLD = 0.5
+"""Share of the given box's columns that depth reaches from which these tell what it is about: most
+of it. In a third of one about somebody who came in, a strip of who stood behind him showed."""
 MOSTLY = 0.5
 """Share of the box's middle without a reading from which it is that of a target without any, and of
 one that shows somebody from which he is meant."""
