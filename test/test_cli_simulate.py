@@ -134,6 +134,31 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFi
     assert (other / 'thesis.txt').exists()
 
 
+def test_what_is_not_ours_is_seen_before_the_first_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The scenes before it were rendered and written."""
+    words = [tmp_path, '--scenario', 'normal', '--count', 2, '--duration', 1, *SMALL]
+    assert run(*words) == 0
+    (tmp_path / 'normal_1' / 'thesis.txt').write_text('years of work')
+    before = sorted((path, path.stat().st_mtime_ns) for path in tmp_path.rglob('*'))
+    assert run(*words, '--overwrite') == 2
+    assert 'thesis.txt' in capsys.readouterr().err
+    assert sorted((path, path.stat().st_mtime_ns) for path in tmp_path.rglob('*')) == before
+    (tmp_path / 'normal_1' / 'thesis.txt').unlink()
+    assert run(*words, '--overwrite') == 0
+
+
+@pytest.mark.parametrize('name', ['walk.mcap', 'walk'])
+def test_one_frame_is_a_recording(tmp_path: Path, name: str) -> None:
+    dest = tmp_path / name
+    assert run(dest, '--size', '160x90', '--rate', '0.1', '--duration', '0.1') == 0
+    with open_recording(dest, ReadOptions()) as recording:
+        assert len(list(recording.frames())) == 1
+        assert recording.groundtruth is not None
+        assert len(recording.groundtruth) == 1
+
+
 @pytest.mark.parametrize(
     ('words', 'message'),
     [
@@ -151,6 +176,18 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFi
         (['--contact-sheet', 'x.jpg', '--count', '1001'], 'give 1 to 1000'),
         (['x.mcap', '--count', '2'], 'name a folder'),
         (['x', '--format', 'mcap'], '.mcap'),
+        (['x.bag'], 'bags are written as .mcap'),
+        (['x.MCAP'], 'bags are written as .mcap'),
+        (['x.db3', '--count', '2'], 'bags are written as .mcap'),
+        (['x.mcap', '--color-format', 'png'], '--color-format means nothing for an mcap file'),
+        (
+            ['x', '--count', '2', '--format', 'mcap', '--color-format', 'jpg'],
+            '--color-format means nothing for an mcap file',
+        ),
+        (['x', '--compression', 'lz4'], '--compression means nothing for a sequence folder'),
+        (['--contact-sheet', 'x.jpg', '--format', 'mcap'], '--format means nothing'),
+        (['--contact-sheet', 'x.jpg', '--color-format', 'jpg'], '--color-format means nothing'),
+        (['--contact-sheet', 'x.jpg', '--compression', 'none'], '--compression means nothing'),
         ([], 'DEST'),
     ],
 )

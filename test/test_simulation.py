@@ -14,10 +14,11 @@ import pytest
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.simulation import SCENARIOS, SimulatedSequence, kinect2_intrinsics, simulate
-from rgbd_kcf_tracker.simulation.actors import FacesActor, ball
+from rgbd_kcf_tracker.simulation.actors import FacesActor, PersonActor, ball
 from rgbd_kcf_tracker.simulation.build import check_request
 from rgbd_kcf_tracker.simulation.motion import CameraMotion, Motion
 from rgbd_kcf_tracker.simulation.people import Stance, random_person
+from rgbd_kcf_tracker.simulation.picture import TARGET, Backdrop, Picture
 from rgbd_kcf_tracker.simulation.room import Room, box_faces, face
 from rgbd_kcf_tracker.simulation.sensor import Sensor, SensorOptions
 from rgbd_kcf_tracker.simulation.solids import Atlas, Lighting, SolidList, render
@@ -78,6 +79,31 @@ def test_depth_is_the_distance_of_the_surface() -> None:
     assert depth[270, 480] == pytest.approx(1.7, abs=0.003)
     assert depth[20, 480] == pytest.approx(4.0, abs=0.003)
     assert simulated.distance == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize('size', [(1920, 1080), (960, 540), (640, 480), (512, 424), (480, 270)])
+@pytest.mark.parametrize('axis', [0, 1])
+def test_depth_lies_where_the_colour_does(size: tuple[int, int], axis: int) -> None:
+    """All depth lay up to two pixels to the right and below, from resizing by rounding down."""
+    sensor = Sensor(CLEAN, kinect2_intrinsics(size), size, np.random.default_rng(0))
+    length = size[1 - axis]
+    ramp = 1 + 3 / length * np.indices((size[1], size[0]))[axis].astype(np.float32)
+    grey = np.full((size[1], size[0], 3), 128, np.uint8)
+    depth = sensor.depth(ramp.astype(np.float32), grey, None, np.random.default_rng(1))
+    moved = (depth - ramp) * length / 3  # pixels from where each reading was taken
+    assert abs(float(np.nanmean(moved))) < 0.1
+
+
+def test_what_gives_no_reading_lies_where_the_target_does() -> None:
+    size = (1920, 1080)
+    sensor = Sensor(CLEAN, kinect2_intrinsics(size), size, np.random.default_rng(0))
+    flat, target = np.full((1080, 1920), 3, np.float32), np.zeros((1080, 1920), bool)
+    target[400:700, 900:1300] = True
+    grey = np.full((1080, 1920, 3), 128, np.uint8)
+    depth = sensor.depth(flat, grey, target, np.random.default_rng(1))
+    rows, cols = np.nonzero(np.isnan(depth))
+    assert (rows.min() + rows.max()) / 2 == pytest.approx(549.5, abs=1.5)
+    assert (cols.min() + cols.max()) / 2 == pytest.approx(1099.5, abs=1.5)
 
 
 def test_depth_noise_grows_with_distance() -> None:
@@ -269,7 +295,7 @@ def test_what_a_tall_person_carries_is_in_view(seed: int) -> None:
 @pytest.mark.timeout(20)
 def test_a_picture_too_low_to_show_what_is_carried_is_made_all_the_same() -> None:
     """He went on for ever in search of a place where a camera that looks down would show it."""
-    assert simulate('carried_mug', seed=6, rate_hz=2, size=(640, 100))[0].visible_fraction < 0.5
+    assert simulate('carried_mug', seed=92, rate_hz=2, size=(640, 100))[0].visible_fraction < 0.5
 
 
 @pytest.mark.parametrize('name', HIDING)
@@ -354,6 +380,77 @@ def test_motion_blur_grows_with_exposure() -> None:
     assert sharpness[1] < 0.5 * sharpness[0]
 
 
+def test_feet_that_move_are_painted_as_far_as_they_are_the_targets() -> None:
+    """A foot ahead of the middle lay under the floor, which is nearer than the middle there."""
+    red = np.full((32, 32, 3), (0, 0, 255), np.uint8)
+    right, ahead = np.array([40.0, 0, 0]), np.array([0, 0, 6.0])
+    room = wall(4.0)
+    room.faces = [face(room.faces[0].corner, right, np.array([0, 40.0, 0]), red),
+                  face(np.array([-20.0, 0, -1]), right, ahead, red)]  # fmt: skip
+    person, _ = random_person(np.random.default_rng(1))
+    actor = PersonActor(person, Motion([(0, -1.5, 2.5), (1, 1.5, 2.5)], heading=[(0, 0.0)]))
+    sensor = SensorOptions(0, 0, 0, 0, exposure_s=0.02)
+    world = World(room, [actor], CameraMotion(1.6, 0.25), 1.0, sensor)
+    backdrop = Backdrop(world, kinect2_intrinsics((640, 360)), (640, 360))
+    bare = all_ = 0
+    for t in np.arange(0.25, 0.76, 0.05):
+        picture = Picture(backdrop, float(t))
+        rows, cols = np.nonzero(picture.owner == TARGET)
+        low = rows > rows.max() - 0.1 * np.ptp(rows)
+        painted = picture.color[rows[low], cols[low]]
+        bare += int((painted[:, :2].max(axis=1) == 0).sum())  # the room's red, in a shadow too
+        all_ += len(painted)
+    assert bare <= 0.005 * all_
+
+
+def test_the_whole_body_of_somebody_near_is_told() -> None:
+    """It ended at a picture's height below the picture, but at a picture's width beside it."""
+    person, _ = random_person(np.random.default_rng(1))
+    actor = PersonActor(person, Motion([(0, 0.0, 1.0)]))
+    truth = record(World(wall(4.0), [actor], CameraMotion(1.6, 0.0), 1.0, CLEAN)).truth(0)
+    assert truth.body is not None
+    ankles = 269.5 + 540.68 * 1.6 / 1.0
+    assert ankles < truth.body.bottom < 540 + 960
+
+
+def test_keys_later_than_the_way_are_kept() -> None:
+    """The table ended two seconds after the last way point."""
+    keys = {'spread': [(0.0, 0.0), (2.5, 0.0), (3.0, 0.35), (4.0, 0.0)]}
+    still = Motion([(0, 1, 3)], heading=[(0, 0.8), (3, 0.8), (4, -0.8)], channels=keys)
+    assert still.value('heading', 2.5) == pytest.approx(0.8, abs=0.01)
+    assert still.value('heading', 4.6) == pytest.approx(-0.8, abs=0.01)
+    assert still.value('spread', 3.0) > 0.25
+    assert still.value('spread', 4.6) == pytest.approx(0.0, abs=0.01)
+    assert (still.value('x', 9.0), still.value('z', 9.0)) == pytest.approx((1, 3))
+
+
+@pytest.mark.parametrize('seed', [0, 92])
+def test_the_world_is_the_same_at_any_size(seed: int) -> None:
+    """Somebody who carries a mug stood farther away in a low picture."""
+    centres = [
+        [float(v) for actor in simulate('carried_mug', seed, size=size).scene.actors
+         for t in (0.0, 2.0) for v in actor.centre(t)]
+        for size in ((640, 360), (640, 480), (640, 200))
+    ]  # fmt: skip
+    assert centres[1] == pytest.approx(centres[0])
+    assert centres[2] == pytest.approx(centres[0])
+
+
+def test_nobody_in_the_crowd_walks_through_a_wall() -> None:
+    for seed in range(8):
+        scene = simulate('crowd', seed, size=SMALL).scene
+        half_width = -float(scene.room.faces[1].corner[0])
+        far = max(abs(float(actor.centre(t)[0])) for actor in scene.actors for t in range(12))
+        assert far < half_width - 0.3
+
+
+def test_a_camera_that_turns_about_sees_walls_all_round() -> None:
+    sequence = simulate('mug_hand_held', seed=1, rate_hz=5, size=SMALL)
+    backdrop = Backdrop(sequence.scene, sequence.intrinsics, SMALL)
+    for t in (0.0, 3.6, 3.9, 4.2):
+        assert np.isfinite(backdrop.draw(backdrop.view(t))[1]).all()
+
+
 def test_sensor_noise_has_the_asked_strength() -> None:
     size = (320, 180)
     sensor = Sensor(SensorOptions(color_noise=4, softness=0), kinect2_intrinsics(size), size,
@@ -385,12 +482,28 @@ def test_irregular_stamps_show_the_same_world() -> None:
     assert box.iou(other) > 0.8
 
 
+def test_each_scenario_loses_other_frames() -> None:
+    one, other = (
+        simulate(name, 3, 30.0, 3.0, SMALL, irregular=True) for name in ('normal', 'crossing')
+    )
+    assert [one.stamp_ns(i) for i in range(30)] != [other.stamp_ns(i) for i in range(30)]
+
+
+def test_one_frame_at_the_least() -> None:
+    for irregular in (False, True):
+        sequence = simulate('normal', 0, 0.1, 0.1, SMALL, irregular)
+        assert len(sequence) == 1
+        assert sequence[0].visible is not None
+
+
 def test_indexing() -> None:
     sequence = simulate('normal', rate_hz=5, duration_s=1.0, size=SMALL)
     assert len(sequence) == 5
     assert sequence[-1].frame.stamp_ns == sequence[4].frame.stamp_ns
     with pytest.raises(IndexError):
         sequence[5]
+    with pytest.raises(TypeError, match='not for a slice'):
+        sequence[0:2]  # type: ignore[index]
 
 
 @pytest.mark.parametrize(
@@ -402,6 +515,10 @@ def test_indexing() -> None:
         ({'rate_hz': math.nan}, 'rate'),
         ({'duration_s': -1.0}, 'duration'),
         ({'size': (10, 10)}, 'size'),
+        ({'seed': 1.5}, 'seed is 1.5: give a whole number'),
+        ({'rate_hz': '30'}, "rate is '30': give a number"),
+        ({'size': (960.0, 540.0)}, 'whole pixels'),
+        ({'size': (960, 540, 3)}, 'width and height'),
     ],
 )
 def test_bad_requests(changes: dict[str, object], words: str) -> None:
@@ -426,3 +543,14 @@ def test_every_scenario_is_documented() -> None:
     page = (Path(__file__).parent.parent / 'docs' / 'simulation.md').read_text()
     for name, scenario in SCENARIOS.items():
         assert f'| `{name}` | {scenario.description} |' in page
+
+
+@pytest.mark.parametrize('name', ['turn_back', 'decoy'])
+def test_the_table_tells_of_the_seeds_that_it_names(name: str) -> None:
+    page = (Path(__file__).parent.parent / 'docs' / 'simulation.md').read_text()
+    row = next(line for line in page.splitlines() if line.startswith(f'| `{name}` |'))
+    seconds, hidden = (float(cell) for cell in row.split('|')[3:5])
+    scenes = [simulate(name, seed, 10.0, size=(160, 90)) for seed in (21, 31)]
+    seen = [scene.truth(i).visible is not None for scene in scenes for i in range(len(scene))]
+    assert seconds == pytest.approx(sum(s.scene.duration_s for s in scenes) / 2, abs=0.1)
+    assert hidden == pytest.approx(100 - 100 * float(np.mean(seen)), abs=2.5)

@@ -135,6 +135,14 @@ def test_dusk_falls_while_the_target_is_away() -> None:
         assert change.max() < 0.4
 
 
+@pytest.mark.parametrize(
+    ('name', 'seed'), [('reunion', 10), ('reunion', 17), ('lookaround', 5), ('lookaround', 48)]
+)
+def test_the_target_is_well_in_view_at_first(name: str, seed: int) -> None:
+    """Somebody for whom no free place was found stood before it."""
+    assert simulate(name, seed=seed, rate_hz=1, size=SMALL).truth(0).visible_fraction > 0.75
+
+
 def test_reunion_is_after_30_s() -> None:
     sequence = simulate('reunion', seed=4, rate_hz=4, size=SMALL)
     truths = [sequence.truths(i) for i in range(len(sequence))]

@@ -11,7 +11,13 @@ from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from rgbd_kcf_tracker.cli.common import add_overwrite_option, escaped, parse_size, progress
+from rgbd_kcf_tracker.cli.common import (
+    add_overwrite_option,
+    escaped,
+    parse_size,
+    progress,
+    refuse,
+)
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
 
 if TYPE_CHECKING:
@@ -26,6 +32,7 @@ MOST_SCENES, MOST_DRAWN = 10_000, 1000
 """Scenes that are recorded, or drawn into one picture, at the most. All places are looked at before
 the first scene is rendered, and more than these are a mistake: 10000 scenes as they are by default
 take a terabyte, and a JPEG file holds 65500 rows."""
+_BAGS = ('.mcap', '.bag', '.db3')
 _EPILOG = """\
 examples:
   rgbd-kcf simulate --list
@@ -73,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--duration',
         type=float,
         metavar='S',
-        help="seconds (default: the scene's own length, 4 to 10, or up to 60 with several people)",
+        help="seconds (default: the scene's own length, 4 to 13, or up to 60 with several people)",
     )
     parser.add_argument(
         '--size',
@@ -102,13 +109,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--color-format',
         choices=('png', 'jpg'),
-        default='png',
         help='of the colour images of a folder (default: png; jpg takes a tenth of the space)',
     )
     parser.add_argument(
         '--compression',
         choices=('none', 'lz4', 'zstd'),
-        default='zstd',
         help='of the chunks of an mcap file (default: zstd)',
     )
 
@@ -136,15 +141,17 @@ def run(args: argparse.Namespace) -> int:
         check_request(name, args.seed, args.rate, args.duration, size)
     jobs = [(name, seed) for name in names for seed in range(args.seed, args.seed + args.count)]
     if args.contact_sheet is not None:
+        refuse(args, 'with --contact-sheet', ('format', 'color_format', 'compression'))
         _draw_sheet(args, jobs, size)
         return 0
     destinations = _destinations(args, jobs)
+    packed, images = args.compression or 'zstd', args.color_format or 'png'
     for dest, (name, seed) in zip(destinations, jobs, strict=True):
         sequence = simulate(name, seed, args.rate, args.duration, size, args.irregular)
         if dest.suffix == '.mcap':
-            _record(sequence, dest, lambda path: _bag(path, size, args.compression, args.overwrite))
+            _record(sequence, dest, lambda path: _bag(path, size, packed, args.overwrite))
         else:
-            _record(sequence, dest, lambda path: _folder(path, args.color_format, args.overwrite))
+            _record(sequence, dest, lambda path: _folder(path, images, args.overwrite))
     return 0
 
 
@@ -178,6 +185,12 @@ def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list
     from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
 
     dest: Path = args.dest
+    if dest.suffix != '.mcap' and dest.suffix.lower() in _BAGS:
+        raise ParameterError(f'{dest}: bags are written as .mcap: name such a file, or a folder')
+    if dest.suffix == '.mcap' or args.format == 'mcap':
+        refuse(args, 'for an mcap file', ('color_format',), 'leave it out')
+    else:
+        refuse(args, 'for a sequence folder', ('compression',), 'leave it out')
     if len(jobs) == 1:
         if args.format == 'mcap' and dest.suffix != '.mcap':
             raise ParameterError(f'--format mcap, but {dest} does not end in .mcap')
@@ -193,7 +206,18 @@ def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list
     found = [dest / f'{name}_{seed}{suffix}' for name, seed in jobs]
     named = {path.name: path for path in found}
     check_outputs(named, overwrite=args.overwrite, folders=() if suffix else named)
+    if not suffix and args.overwrite:
+        for path in found:
+            _check_ours(path)
     return found
+
+
+def _check_ours(folder: Path) -> None:
+    """Refuse a folder that holds what we did not write, as its writer would in its turn."""
+    from rgbd_kcf_tracker.recordings import SequenceWriter
+
+    if folder.is_dir() and any(folder.iterdir()):
+        SequenceWriter(folder, overwrite=True).close(whole=False)  # leaves all as it was
 
 
 def _record(

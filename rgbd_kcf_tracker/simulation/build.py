@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from numbers import Integral, Real
 
 import numpy as np
 
@@ -36,8 +37,17 @@ def check_request(
     """Check the arguments of `simulate`.
 
     Raises:
-        ParameterError: where a name is unknown or a number out of range.
+        ParameterError: where a name is unknown, or a number none or out of range.
     """
+    for name, given, kind in (
+        ('seed', seed, Integral), ('rate', rate_hz, Real),
+        ('duration', 0.0 if duration_s is None else duration_s, Real),
+    ):  # fmt: skip
+        if not isinstance(given, kind):
+            whole = 'whole ' if kind is Integral else ''
+            raise ParameterError(f'{name} is {given!r}: give a {whole}number')
+    if len(size) != 2 or not all(isinstance(side, Integral) for side in size):
+        raise ParameterError(f'size is {size!r}: give width and height in whole pixels')
     if scenario not in SCENARIOS:
         raise ParameterError(
             f'unknown scenario {scenario!r}: choose one of {", ".join(sorted(SCENARIOS))}'
@@ -62,23 +72,25 @@ def simulate(
         scenario: a name in `SCENARIOS`.
         seed: of everything random; the same seed shows the same world at any rate.
         rate_hz: frames per second.
-        duration_s: seconds to record; by default the scene's own length. Past its end the actors
-            stand still.
+        duration_s: seconds to record, one frame at the least; by default the scene's own length.
+            Past that everybody goes to the end of their way and stands still there; with several
+            people nobody has planned any more.
         size: width and height of the picture in pixels.
         irregular: stamps that vary by some tenths of the interval, lost frames and gaps, as of a
             camera on a busy machine.
 
     Raises:
-        ParameterError: where a name is unknown or a number out of range.
+        ParameterError: where a name is unknown, or a number none or out of range.
     """
     check_request(scenario, seed, rate_hz, duration_s, size)
     camera = kinect2_intrinsics(size)
-    rng = np.random.default_rng([seed, zlib.crc32(scenario.encode())])
+    key = [seed, zlib.crc32(scenario.encode())]
+    rng = np.random.default_rng(key)
     scene = SCENARIOS[scenario].build(Stage(rng, camera, size))
     length = scene.duration_s if duration_s is None else duration_s
-    offsets_ns = [round(k * 1e9 / rate_hz) for k in range(max(2, round(length * rate_hz)))]
+    offsets_ns = [round(k * 1e9 / rate_hz) for k in range(max(1, round(length * rate_hz)))]
     if irregular:
-        offsets_ns = _disturbed(offsets_ns, rate_hz, np.random.default_rng([seed, 1]))
+        offsets_ns = _disturbed(offsets_ns, rate_hz, np.random.default_rng([*key, 1]))
     return SimulatedSequence(scene, scenario, seed, rate_hz, offsets_ns, size, camera)
 
 

@@ -143,7 +143,7 @@ class Hall:
         walls = [_part(wall, half, box) for box in (
             (-half, left, 0, HEIGHT), (right, half, 0, HEIGHT), (left, right, high, HEIGHT),
         )]  # fmt: skip
-        pictures = [f for f in room.faces[5:] if not _beside(f, left - 0.1, right + 0.1)]
+        pictures = [f for f in room.faces[6:] if not _beside(f, left - 0.1, right + 0.1)]
         back, thick = depth + stage.uniform(1.6, 2.4), 0.12
         light = stage.uniform(0.5, 0.95)
         x, y, z = np.eye(3)
@@ -162,7 +162,7 @@ class Hall:
             hinge = np.array([outer, 0.0, depth + 0.12 + self._door_width / 2])
             leaf = materials.cabinet(rng, 256, 128)
             beyond += box_faces(hinge, (0.04, high, self._door_width), 0.0, [leaf])
-        room.faces[:] = [*walls, *room.faces[1:5], *beyond, *pictures]
+        room.faces[:] = [*walls, *room.faces[1:6], *beyond, *pictures]
         self.plan.footprints += [
             Footprint(-half - 1, depth, left, depth + thick),
             Footprint(right, depth, half + 1, depth + thick),

@@ -186,6 +186,4 @@ def poster(rng: np.random.Generator, h: int, w: int) -> Texture:
     return shaded(rng, image, broad=0.03, grain=0.02)
 
 
-FURNITURE: tuple[Callable[[np.random.Generator, int, int], Texture], ...] = (
-    cabinet, bookshelf, cardboard, wood,
-)  # fmt: skip
+FURNITURE: tuple[Callable[[np.random.Generator, int, int], Texture], ...] = (cabinet, bookshelf)

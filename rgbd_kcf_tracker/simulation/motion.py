@@ -43,7 +43,8 @@ class Motion:
     """A figure's way through the room.
 
     Args:
-        points: ``(seconds, x, z)`` way points; it stands still before the first and after the last.
+        points: ``(seconds, x, z)`` way points; it stands still before the first and after the last,
+            but for its ``heading`` and ``channels``.
         heading: ``(seconds, radians)``; without it the figure looks where it goes.
         stride: metres per two steps.
         corner_s: smoothing of corners and of starting and stopping.
@@ -59,7 +60,9 @@ class Motion:
     ) -> None:  # fmt: skip
         points = [(float(t), float(x), float(z)) for t, x, z in points]
         self._start = min(points[0][0], 0.0) - 1.0
-        t = np.arange(self._start, points[-1][0] + 2.0, _STEP)
+        ends = [points[-1][0], *(keys[-1][0] for keys in [heading or (), *(channels or {}).values()]
+                                 if len(keys))]  # fmt: skip
+        t = np.arange(self._start, max(ends) + 2.0, _STEP)
         x = _keyed(t, [(p[0], p[1]) for p in points], corner_s)
         z = _keyed(t, [(p[0], p[2]) for p in points], corner_s)
         vx, vz = np.gradient(x, _STEP), np.gradient(z, _STEP)

@@ -27,12 +27,13 @@ class Truth:
 
     Attributes:
         shown: box of all that shows of it, however little; None where nothing does.
-        body: box of the whole target, hidden parts and those beyond the image's border included;
-            None where it is wholly outside the image.
+        body: box of the whole target, hidden parts and those beyond the image's border included,
+            up to the longer side of the image beyond each; None where it is wholly outside it.
         visible_fraction: visible share of the whole target's area, 0 to 1; what lies beyond the
             border counts as hidden.
         position: of the target's middle in the camera's optical frame (right, down, forward),
-            metres.
+            metres. Of one of several people who is away it is where they left, or will enter
+            first, though nobody is there; ``body`` is None then.
     """
 
     shown: Box | None
@@ -47,7 +48,7 @@ class Truth:
 
     @property
     def distance(self) -> float:
-        """Of the target's middle along the optical axis, metres."""
+        """Of the target's middle along the optical axis, metres; see ``position``."""
         return self.position[2]
 
 
@@ -122,10 +123,11 @@ class Picture:
             self.color = _blurred(self.color, *self._streak(middle, middle))
         self._alone: dict[int, Layer] = {}
         w, h = self.width, self.height
+        beyond = max(w, h)  # on every side, so that nobody who is near is cut off below
         layers: list[tuple[float, int, Layer]] = []
         for i, actor in enumerate(self.scene.actors):
             told = i in self.scene.people
-            window = (-w, -h, 2 * w, 2 * h) if told else (0, 0, w, h)
+            window = (-beyond, -beyond, w + beyond, h + beyond) if told else (0, 0, w, h)
             layer = actor.draw(t, self.view, window, shade)
             if layer is not None:
                 if told:
@@ -209,7 +211,10 @@ class Picture:
         cover[place][..., :3] = layer.color[source]
         cover[place][..., 3] = np.where(layer.mask[source], 255, 0)
         blurred = _blurred(cover, *streak).astype(np.float32)
-        front = (behind > distance)[..., None]
+        # feet may be nearer than the middle, and the floor behind them is, too
+        near = np.full(behind.shape, distance, np.float32)
+        np.copyto(near[place], layer.z[source], where=layer.mask[source])
+        front = (behind > near)[..., None]
         alpha = blurred[..., 3:] * np.float32(1 / 255) * front
         window = self.color[y0:y1, x0:x1]
         window[:] = np.minimum(window * (1 - alpha) + blurred[..., :3] * front, 255)

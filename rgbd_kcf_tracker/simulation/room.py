@@ -189,6 +189,8 @@ def random_room(
         face(-half_width * x + depth * z, wide * x, -deep * z, materials.floor(rng, 1024, 1024)),
         face(top_left + near * z, wide * x, deep * z, ceiling),
     ]  # fmt: skip
+    back = room.faces[0]  # the wall behind the camera is the same, for a camera that turns about
+    room.faces.append(Face(top_left + wide * x + near * z, -back.across, back.down, back.pyramid))
     for _ in range(int(rng.integers(1, 5))):
         w, h = rng.uniform(0.4, 1.6), rng.uniform(0.4, 1.2)
         left = rng.uniform(-half_width, half_width - w)
@@ -212,7 +214,7 @@ def add_furniture(rng: np.random.Generator, room: Room, depth: float, half_width
     turn = float(rng.normal(0, 0.15))
     kind = rng.choice(['cupboard', 'cupboard', 'box', 'table', 'chair', 'plant'])
     if kind == 'cupboard':
-        make = materials.FURNITURE[int(rng.integers(2))]
+        make = materials.FURNITURE[int(rng.integers(len(materials.FURNITURE)))]
         size = (rng.uniform(0.6, 1.5), rng.uniform(0.7, 2.1), rng.uniform(0.35, 0.6))
         room.faces += box_faces(
             spot, size, turn, [make(rng, 320, 320), materials.wood(rng, 128, 128)]

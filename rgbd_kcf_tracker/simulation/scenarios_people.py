@@ -133,6 +133,18 @@ def _apart(place: Point, others: list[Point]) -> bool:
     )
 
 
+def _least_hiding(places: list[Point], taken: list[Point]) -> Point:
+    """The place of somebody who hides the target, the first of the others, least."""
+    if not taken:
+        return min(places, key=lambda place: place[1])  # before the furniture
+
+    def gaps(place: Point) -> tuple[float, float]:
+        beside = [abs(place[0] / place[1] - x / z) for x, z in taken]
+        return min(beside[0], 0.25), min(beside)
+
+    return max(places, key=gaps)
+
+
 def _begin(diary: _Diary, others: list[_Diary], seat: bool) -> None:
     """Stand, walk or perhaps sit in view at first."""
     stage, hall = diary.stage, diary.hall
@@ -144,12 +156,17 @@ def _begin(diary: _Diary, others: list[_Diary], seat: bool) -> None:
         diary.stay(0.6)
         diary.go(seat_.front, straight=True)
         return
+    taken, tried = [d.start for d in others], []
     spot = hall.spot((1.9, 3.8), 0.65)
     for _ in range(60):
         clear = bool(others) or hall.in_sight(spot)  # the target, who is the first, is
-        if clear and _apart(spot, [d.start for d in others]):
+        if clear and _apart(spot, taken):
             break
+        tried.append(spot)
         spot = hall.spot((1.9, 3.8), 0.65)
+    else:  # any place will do from which the target is seen
+        if not (_apart(spot, taken[:1]) if taken else hall.in_sight(spot)):
+            spot = _least_hiding(tried, taken)
     diary.begin(spot)
     if stage.rng.uniform() < 0.7:
         diary.look_about(stage.uniform(2.0, 6.0))

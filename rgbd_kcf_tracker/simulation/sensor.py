@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.geometry import Intrinsics
 DEPTH_FOCAL = 365.0
 BASELINE = 0.052
 HALF_ANGLE = np.radians(35.3)
+_NEAREST = cv2.INTER_NEAREST_EXACT  # INTER_NEAREST would move depth by a pixel or two
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ class Sensor:
         Returns:
             ``(H, W)`` float32 metres, NaN where there is no reading.
         """
-        z = np.asarray(cv2.resize(ideal, self.small, interpolation=cv2.INTER_NEAREST), np.float32)
+        z = np.asarray(cv2.resize(ideal, self.small, interpolation=_NEAREST), np.float32)
         z = np.minimum(z, np.float32(12.0))
         high, low = cv2.dilate(z, None), cv2.erode(z, None)
         spread = high - low
@@ -154,7 +155,7 @@ class Sensor:
         first = np.minimum.accumulate(shadow[:, ::-1], axis=1)[:, ::-1]
         bad |= shadow > first + np.float32(0.75)
         bad |= self._holes[self._cut(rng)]
-        small = cv2.resize(color, self.small, interpolation=cv2.INTER_NEAREST)
+        small = cv2.resize(color, self.small, interpolation=_NEAREST)
         # black hair and cloth fall out in part, the more the farther
         dark = cv2.cvtColor(small, cv2.COLOR_BGR2GRAY) < 26
         bad |= dark & (chance < np.float32(0.05) * z)
@@ -169,10 +170,10 @@ class Sensor:
         np.rint(z, out=z)
         z *= np.float32(0.001)
         if target is not None:
-            mask = cv2.resize(target.view(np.uint8), self.small, interpolation=cv2.INTER_NEAREST)
+            mask = cv2.resize(target.view(np.uint8), self.small, interpolation=_NEAREST)
             bad |= cv2.dilate(mask, None) > 0
         z[bad] = np.nan
-        full = cv2.resize(z, (self.width, self.height), interpolation=cv2.INTER_NEAREST)
+        full = cv2.resize(z, (self.width, self.height), interpolation=_NEAREST)
         if self.options.shift != (0, 0):
             right, down = self.options.shift
             moved = np.array([[1, 0, right], [0, 1, down]], np.float64)

@@ -56,7 +56,7 @@ class SimulatedFrame:
 
     @property
     def distance(self) -> float:
-        """See `Truth`."""
+        """See `Truth`: of a target that is away, where it left."""
         return self.truth.distance
 
 
@@ -98,6 +98,10 @@ class SimulatedSequence:
 
     def __getitem__(self, index: int) -> SimulatedFrame:
         """Render one frame."""
+        if isinstance(index, slice):
+            raise TypeError(
+                'a frame is rendered when it is asked for: ask for one, not for a slice'
+            )
         offset_ns = self._offsets_ns[index]
         t = offset_ns * 1e-9
         rng = np.random.default_rng([*self._key, offset_ns // 1000])
@@ -140,7 +144,10 @@ class SimulatedSequence:
         return rotation.T, place
 
     def velocity(self, index: int) -> tuple[float, float, float]:
-        """The target's over the ground at one frame, metres per second in the optical frame."""
+        """The target's over the ground at one frame, metres per second in the optical frame.
+
+        Of a target that is away it means nothing, nor does its position: see `Truth`.
+        """
         t = self._offsets_ns[index] * 1e-9
         target = self.scene.actors[self.scene.people[0]]
         if isinstance(target, VisitorActor):

@@ -83,7 +83,6 @@ class Stage:
     def __init__(self, rng: np.random.Generator, camera: Intrinsics, size: tuple[int, int]) -> None:
         self.rng = rng
         self.half_tan = size[0] / 2 / camera.fx
-        self._half_tan_up = size[1] / 2 / camera.fy
         self.depth = float(rng.uniform(5.0, 7.5))
         self.half_width = float(rng.uniform(0.62, 0.95) * self.depth)
         self.camera_height = self.pitch = 0.0
@@ -108,8 +107,11 @@ class Stage:
         return share * z * self.half_tan
 
     def shown_from(self, height: float) -> float:
-        """Metres ahead from which the picture shows what is so high above the floor, if any."""
-        edge = math.atan(self._half_tan_up) - self.pitch
+        """Metres ahead from which a picture of 16:9 shows what is so high above the floor, if any.
+
+        Of the size that is recorded, the world would depend on it.
+        """
+        edge = math.atan(self.half_tan * 9 / 16) - self.pitch
         return (height - self.camera_height) / math.tan(edge) if edge > 0 else math.inf
 
     def person(self, like: Wardrobe | None = None, child: bool = False) -> Person:
