@@ -23,6 +23,7 @@ from people_rig import (
     GREY,
     RED,
     ROWS,
+    TOP,
     WALL,
     Someone,
     images,
@@ -1640,6 +1641,24 @@ def test_who_shows_at_the_end_of_depth_is_not_meant_by_a_box_that_lies_mostly_be
     scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
     assert drawn.iou(b) > 0.15
     assert surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters()) is None
+
+
+def test_of_whom_depth_shows_an_arm_and_a_leg_where_it_ends_colour_tells_the_rest():
+    """By what showed of him nobody was he, himself among them, and he was lost for good."""
+    one = Someone(0.5, 2.5)
+    color, depth = images([one])
+    left, hips = round(one.box.x), round((TOP + 0.85) * CAMERA.fy / one.z + CAMERA.cy)
+    depth[:, left + 22 :] = np.nan
+    trunk = depth[:hips, left + 2 :]
+    trunk[trunk == one.z] = np.nan
+    targets = MetricTargets(MetricParameters())
+    number = targets.add(Frame(color, depth, 0, CAMERA), one.box)
+    assert targets._followers[number].seen is not None
+    person = targets.person(number)
+    assert person is not None
+    for shirt, trousers, his in ((RED, BLACK, True), (BLUE, BLACK, False), (RED, GREEN, False)):
+        (sight,) = Watched().see(Someone(0.0, 2.5, shirt, trousers)).sights
+        assert (person.gallery.log_odds(sight.view) > 0) == his
 
 
 @pytest.mark.parametrize(('told', 'taken'), [(20, False), (34, True)])

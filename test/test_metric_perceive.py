@@ -870,6 +870,25 @@ def test_pieces_above_each_other_are_one_figure():
     assert figures[0].place == pytest.approx([0.3, 3.0], abs=0.03)
 
 
+@pytest.mark.parametrize(
+    ('ahead', 'knees', 'his'), [(0.42, 1.1, True), (0.7, 1.1, False), (0.42, 0.88, False)]
+)
+def test_the_legs_of_who_sits_are_nearer_by_a_thigh(ahead: float, knees: float, his: bool):
+    """Of one who sat down, facing the camera, the box ended at the chair's seat."""
+    one = Someone(0.3, 3.0)
+
+    def seated(depth: np.ndarray) -> np.ndarray:
+        hips, knee = (round((TOP + y) * CAMERA.fy / one.z + CAMERA.cy) for y in (0.85, knees))
+        legs = depth[hips:] == one.z
+        depth[hips:knee][legs[: knee - hips]] = WALL
+        depth[knee:][legs[knee - hips :]] = one.z - ahead
+        return depth
+
+    figures = find_figures(scene_of([one], seated), NONE_EXPECTED)
+    ends = [figure.seen.top + figure.seen.mask.shape[0] for figure in figures]
+    assert (len(figures) == 1 and ends[0] == pytest.approx(one.box.bottom, abs=2)) == his
+
+
 def test_pieces_at_other_depths_or_beside_are_other_figures():
     people = [Someone(-0.8, 3.0), Someone(0.4, 3.0), Someone(0.6, 2.0)]
     figures = find_figures(scene_of(people), NONE_EXPECTED)

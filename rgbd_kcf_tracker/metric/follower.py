@@ -8,6 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
@@ -19,7 +21,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
-from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike
+from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
@@ -63,6 +65,9 @@ MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or
 somebody who touches it."""
+LEAST_KNOWN = 0.3
+"""Share of a box that a surface fills, at the least, to be known by it where depth's view ends:
+half a person fills a third, and by legs alone nobody is known again."""
 SOON = 0.25
 """Seconds after which nobody is where a box was drawn about him: at a walk (1.4 m/s) he is half a
 body farther."""
@@ -133,6 +138,8 @@ class Follower:
                 self._gated = GatedLook(
                     self._look, account, box, self._since, parameters.seen_ratio
                 )
+            elif account is not None:
+                self._know_as_drawn(account, box, self._look)
         belief = self._belief()
         self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
 
@@ -226,6 +233,18 @@ class Follower:
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
             person.gallery = Gallery()
             known = View.of(view, account.scene.codes, seen, None, above)
+            person.gallery.learn(known, account.time)
+
+    def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
+        """Know by the colours of his box of whom depth shows little, where its view ends."""
+        seen, person = self.seen, self.person
+        if seen is None or person is None or not account.scene.ends(box).any:
+            return
+        if np.count_nonzero(seen.mask) > LEAST_KNOWN * box.over(account.scene.view.step).area:
+            return
+        known = view_in(account.scene, box, look, seen.depth)
+        if known is not None and len(person.gallery.views) == 1:
+            person.gallery = Gallery()
             person.gallery.learn(known, account.time)
 
     def _depth_of_surface(self) -> float | None:

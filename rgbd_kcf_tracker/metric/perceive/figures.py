@@ -41,6 +41,9 @@ FLOATS = 1.3
 piece of the ceiling: dark trousers may give no reading, and hips are at 0.9 m."""
 DEPTH_STEP, DEPTH_STEP_PER_METRE = 0.25, 0.03
 """Metres in depth between two pieces of one person: an arm's reach, and the sensor's noise."""
+SEATED, SHIN = 0.5, 0.6
+"""Metres by which the legs of who sits are nearer than the rest of him, a thigh's length, and how
+tall such a piece below him is at the most."""
 GAP_ABOVE, GAP_BESIDE = 0.35, 0.05
 """Metres between two pieces of one person, above each other, which a table's edge or an arm may
 hide, and beside: a seam without a reading."""
@@ -132,9 +135,11 @@ def _joined(
         right, bottom, depth = left + width, top + height, float(ahead[label])
         area = float(areas[label])
         for index, (x0, y0, x1, y1, z, total) in enumerate(extents):
-            if abs(depth - z) > depth_step(z):
-                continue
             across, down = z / k.fx, z / k.fy
+            shins = y1 <= top and height * down < SHIN and x0 <= (left + right) / 2 <= x1
+            nearer = SEATED - DEPTH_STEP if shins else 0.0
+            if not -depth_step(z) - nearer < depth - z < depth_step(z):
+                continue
             beside = (max(left, x0) - min(right, x1)) * across
             above = (max(top, y0) - min(bottom, y1)) * down
             wide = (max(right, x1) - min(left, x0)) * across
