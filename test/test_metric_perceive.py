@@ -871,20 +871,28 @@ def test_pieces_above_each_other_are_one_figure():
 
 
 @pytest.mark.parametrize(
-    ('ahead', 'knees', 'his'), [(0.42, 1.1, True), (0.7, 1.1, False), (0.42, 0.88, False)]
+    ('ahead', 'floor', 'his'),
+    [(0.42, 0.85, True), (0.7, 0.85, False), (0.42, 1.3, False), (0.42, None, False)],
 )
-def test_the_legs_of_who_sits_are_nearer_by_a_thigh(ahead: float, knees: float, his: bool):
-    """Of one who sat down, facing the camera, the box ended at the chair's seat."""
+def test_the_legs_of_who_sits_are_nearer_by_a_thigh(ahead: float, floor: float | None, his: bool):
+    """Of one who sat down, facing the camera, the box ended at the chair's seat.
+
+    Who comes in before somebody, at the picture's lower end, is nobody's legs: he is higher up.
+    """
     one = Someone(0.3, 3.0)
+    hips, knees = (round((TOP + y) * CAMERA.fy / one.z + CAMERA.cy) for y in (0.85, 1.1))
 
     def seated(depth: np.ndarray) -> np.ndarray:
-        hips, knee = (round((TOP + y) * CAMERA.fy / one.z + CAMERA.cy) for y in (0.85, knees))
         legs = depth[hips:] == one.z
-        depth[hips:knee][legs[: knee - hips]] = WALL
-        depth[knee:][legs[knee - hips :]] = one.z - ahead
+        depth[hips:knees][legs[: knees - hips]] = WALL
+        depth[knees:][legs[knees - hips :]] = one.z - ahead
         return depth
 
-    figures = find_figures(scene_of([one], seated), NONE_EXPECTED)
+    scene = scene_of([one], seated)
+    if floor is not None:  # metres below the camera
+        down = (np.arange(ROWS, dtype=np.float32)[:, None] - CAMERA.cy) / CAMERA.fy
+        scene = dataclasses.replace(scene, elevation=np.float32(floor) - down * scene.view.depth)
+    figures = find_figures(scene, NONE_EXPECTED)
     ends = [figure.seen.top + figure.seen.mask.shape[0] for figure in figures]
     assert (len(figures) == 1 and ends[0] == pytest.approx(one.box.bottom, abs=2)) == his
 

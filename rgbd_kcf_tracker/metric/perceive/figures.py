@@ -41,9 +41,9 @@ FLOATS = 1.3
 piece of the ceiling: dark trousers may give no reading, and hips are at 0.9 m."""
 DEPTH_STEP, DEPTH_STEP_PER_METRE = 0.25, 0.03
 """Metres in depth between two pieces of one person: an arm's reach, and the sensor's noise."""
-SEATED, SHIN = 0.5, 0.6
-"""Metres by which the legs of who sits are nearer than the rest of him, a thigh's length, and how
-tall such a piece below him is at the most."""
+SEATED, SHIN = 0.5, 0.45
+"""Metres by which the shins of who sits are nearer than the rest of him, a thigh's length, and
+above the floor where their middle is at the most: whoever else is nearer has a trunk."""
 GAP_ABOVE, GAP_BESIDE = 0.35, 0.05
 """Metres between two pieces of one person, above each other, which a table's edge or an arm may
 hide, and beside: a seam without a reading."""
@@ -94,7 +94,10 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
     part = slice(y, y + height), slice(x, x + width)
     pieces = surfaces_in(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
-    for members in _joined(scene, pieces, scene.forward[part]):
+    above = np.full(len(pieces), np.inf)
+    if scene.elevation is not None:
+        above = pieces.means(scene.elevation[part])
+    for members in _joined(scene, pieces, pieces.means(scene.forward[part]), above):
         boxes = pieces.boxes[members]
         left, top = int(boxes[:, 0].min()), int(boxes[:, 1].min())
         right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
@@ -118,16 +121,22 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
 
 
 def _joined(
-    scene: Scene, pieces: Surfaces, forward: npt.NDArray[np.float32]
+    scene: Scene, pieces: Surfaces, ahead: FloatArray, above_floor: FloatArray
 ) -> list[npt.NDArray[np.intp]]:
-    """Labels of the pieces that make one figure each, the largest first."""
+    """Labels of the pieces that make one figure each, the largest first.
+
+    Args:
+        scene: of now.
+        pieces: of what stands before the room.
+        ahead: ``(n,)`` metres along the floor to their middles.
+        above_floor: ``(n,)`` metres of these above it, infinite where no floor is known.
+    """
     k = scene.view.intrinsics
     areas = pieces.areas(k)
     possible = (pieces.pixels >= LEAST_PIXELS) & (areas > LEAST_PIECE)
     possible[0] = False
     labels = np.flatnonzero(possible)
     labels = labels[np.argsort(-areas[labels], kind='stable')]
-    ahead = pieces.means(forward)
     groups: list[list[int]] = []
     extents: list[tuple[float, float, float, float, float, float]] = []
     for label in labels:
@@ -136,7 +145,7 @@ def _joined(
         area = float(areas[label])
         for index, (x0, y0, x1, y1, z, total) in enumerate(extents):
             across, down = z / k.fx, z / k.fy
-            shins = y1 <= top and height * down < SHIN and x0 <= (left + right) / 2 <= x1
+            shins = y1 <= top and above_floor[label] < SHIN and x0 <= (left + right) / 2 <= x1
             nearer = SEATED - DEPTH_STEP if shins else 0.0
             if not -depth_step(z) - nearer < depth - z < depth_step(z):
                 continue
