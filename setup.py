@@ -127,6 +127,7 @@ setup(
         'lz4',
         'zstandard',
         'PyYAML',
+        *BATCH,  # small, and many recordings at once need it; colcon leaves it out
     ],
     extras_require={
         'batch': BATCH,

@@ -334,7 +334,16 @@ def test_outputs_that_cannot_be(
     assert 'is the source itself' in fails(capsys, 'convert', source, source)
     assert 'must end in .mcap' in fails(capsys, 'convert', source, tmp_path / 'a.bag')
     assert '--table parquet' in fails(capsys, 'track', source, '--output', tmp_path / 'a.parquet')
+    for option, name in (
+        ('--output', 'a.mp4'), ('--output', 'a.MCAP'), ('--mot', 'a.mkv'), ('--mot', 'a.bag'),
+    ):  # fmt: skip
+        error = fails(capsys, 'track', source, option, tmp_path / name)
+        assert f'{option} {tmp_path / name} would be' in error
+    for name in ('a.bag', 'a.db3', 'a'):
+        error = fails(capsys, 'track', source, '--bag', tmp_path / name)
+        assert f'--bag {tmp_path / name} must end in .mcap' in error
     assert source.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['file', 'in.mcap']
 
 
 def test_stream_whose_size_changes_goes_on(

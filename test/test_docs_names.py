@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import rgbd_kcf_tracker
+from rgbd_kcf_tracker import recordings
 from rgbd_kcf_tracker.cli.main import SUBCOMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -83,6 +84,16 @@ def test_commands_and_their_options_are_there(page: Path) -> None:
             assert command in SUBCOMMANDS, line
             for option in re.findall(r'(?<!\S)--[a-z][a-z-]*', part.split('|')[0]):
                 assert option in options(command), f'{page.name}: {line.strip()}'
+
+
+def test_what_is_used_from_python_is_exported() -> None:
+    text = (ROOT / 'docs' / 'recordings.md').read_text(encoding='utf-8')
+    told = re.search(r'^From Python: (.*?)\n\n', text, re.M | re.S)
+    assert told is not None
+    names = set(re.findall(r'`(\w+)`', told[1]))
+    assert len(names) > 5
+    assert names <= set(recordings.__all__)
+    assert all(hasattr(recordings, name) for name in names)
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda p: p.name)

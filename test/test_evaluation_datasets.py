@@ -151,6 +151,22 @@ def test_scenes_that_simulate_wrote_are_grouped_by_scenario(own: Path):
     assert (sequence.name, sequence.scenario) == ('long_occlusion_12', 'long_occlusion')
 
 
+def test_where_a_recording_that_was_named_lies_says_nothing(own: Path):
+    target = own.rename(own.parent / 'face')  # a scenario whose target is no person
+    bag = target.parent / 'walk.mcap'
+    bag.write_bytes(b'')
+    everyone = DatasetOptions(everyone=True)
+    for path, options in ((target, None), (bag, None), (target, everyone)):
+        if options:
+            (path / 'groundtruth.txt').rename(path / 'groundtruth_1.txt')
+        (named,) = open_dataset(str(path), options)
+        found = [s for s in open_dataset(str(path.parent), options) if s.path == path]
+        assert [named.scenario, *(s.scenario for s in found)] == ['-', path.parent.name]
+    numbered = target.rename(target.with_name('walk_1'))
+    (numbered / 'groundtruth_1.txt').rename(numbered / 'groundtruth.txt')
+    assert [s.scenario for s in open_dataset(str(numbered))] == ['walk'], 'its own name tells'
+
+
 @pytest.mark.parametrize('delimiter', [',', '\t', ' ', ', ', ';'])
 def test_otb_boxes_are_1_based_whatever_parts_them(tmp_path: Path, delimiter: str):
     path = tmp_path / 'Car'

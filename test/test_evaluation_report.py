@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.evaluation import plots, score_tables, strips, thesis, thesis_tables
 from rgbd_kcf_tracker.evaluation.categories import derive
 from rgbd_kcf_tracker.evaluation.measured import Measured
-from rgbd_kcf_tracker.evaluation.metrics import compare, princeton, vot
+from rgbd_kcf_tracker.evaluation.metrics import calibration, compare, princeton, vot
 from rgbd_kcf_tracker.evaluation.perframe import Info, Result, read_per_frame, write_per_frame
 from rgbd_kcf_tracker.evaluation.store import Truth
 from rgbd_kcf_tracker.evaluation.table import Table
@@ -266,6 +266,18 @@ def test_scores_on_real_and_simulated_data_apart():
     assert [plots.least_shown(curves[i:]) for i in (0, 1)] == [0.3, 0.9]
     assert plots.least_shown([np.full(3, np.nan)]) == 0.9, 'scores below 0, as of other trackers'
     assert len(plots.reliability_plot(found)) > 1000
+
+
+def test_a_legend_lies_on_no_curve(monkeypatch: pytest.MonkeyPatch):
+    figures = []
+    monkeypatch.setattr(plots.plot_style, 'png', figures.append)
+    table = calibration.reliability(np.linspace(0.05, 0.95, 10), np.ones(10, bool))
+    plots.pairs_plot({'a': table, 'b': table})
+    figures[0].canvas.draw()
+    first = figures[0].axes[0]
+    legend = first.get_legend().get_window_extent()
+    assert legend.y0 >= 0, 'and is not cut off'
+    assert legend.y1 < first.xaxis.label.get_window_extent().y0
 
 
 def test_interval_of_the_mean():

@@ -11,11 +11,13 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 
+from rgbd_kcf_tracker.extras import EXTRAS
 from rgbd_kcf_tracker.recordings import GENERIC, BagWriter
 from rgbd_kcf_tracker.simulation import simulate
 
@@ -24,7 +26,7 @@ NAME = 'rgbd_kcf_tracker'
 EXECUTABLES = ('rgbd-kcf', 'replay', 'viewer', 'follow', 'tracker')
 NOT_ON_A_ROBOT = (
     *('rosbags', 'mcap', 'mcap_ros2', 'lz4', 'zstandard'),
-    *('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil'),
+    *('matplotlib', 'jinja2', 'imageio_ffmpeg', 'tqdm', 'psutil', 'threadpoolctl'),
 )
 
 
@@ -89,6 +91,26 @@ def test_pip_install(source: Path, tmp_path: Path) -> None:
     assert said.startswith('usage: tracker')
     assert_share_is_complete(prefix / 'share' / NAME)
     assert (prefix / 'share/ament_index/resource_index/packages' / NAME).is_file()
+    (metadata,) = packages.glob(f'{NAME}-*.dist-info/METADATA')
+    required = re.findall(r'^Requires-Dist: ([\w-]+)[^;\n]*$', metadata.read_text('utf-8'), re.M)
+    assert set(EXTRAS['batch'][0]) <= set(required), 'several recordings need no extra'
+
+
+def test_the_sdist_holds_what_wheels_and_tests_are_made_of(tmp_path: Path) -> None:
+    folders = (NAME, 'config', 'docs', 'launch', 'resource', 'test')
+    copy = tmp_path / 'source'
+    for folder in folders:
+        shutil.copytree(ROOT / folder, copy / folder, ignore=shutil.ignore_patterns('__pycache__'))
+    for path in (*(p for p in ROOT.iterdir() if p.is_file()), ROOT / '.ci' / 'run'):
+        (copy / path.relative_to(ROOT)).parent.mkdir(exist_ok=True)
+        shutil.copy(path, copy / path.relative_to(ROOT))
+    wanted = {str(p.relative_to(copy)) for p in copy.rglob('*') if p.is_file()}
+    wanted = {name for name in wanted if name == '.ci/run' or not name.startswith('.')}
+    run(sys.executable, 'setup.py', '-q', 'sdist', '-d', tmp_path, cwd=copy)
+    (made,) = tmp_path.glob('*.tar.gz')
+    with tarfile.open(made) as archive:
+        held = {name.partition('/')[2] for name in archive.getnames()}
+    assert not wanted - held
 
 
 @pytest.mark.ros
@@ -170,6 +192,13 @@ def test_rosdep_needs_apt_alone() -> None:
     keys = {e.text for e in manifest if e.tag.endswith('depend')}
     assert not {key for key in keys if key.endswith('-pip')}
     assert not keys & {'mcap-ros2-support'}
+
+
+def test_the_page_names_what_apt_has_of_the_extras() -> None:
+    page = (ROOT / 'docs' / 'install.md').read_text(encoding='utf-8')
+    for extra in ('batch', 'report', 'video'):
+        for name in EXTRAS[extra][1].split():
+            assert f'`{name}`' in page, f'{name} of {extra}'
 
 
 WITHOUT = f"""

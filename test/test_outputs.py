@@ -295,6 +295,16 @@ def test_the_moving_picture_replaces_nothing_unasked(
     assert picture.read_bytes().startswith(b'GIF8')
 
 
+@pytest.mark.parametrize('last', ['10', '20'])
+def test_a_moving_picture_of_no_frames_is_refused(
+    last: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip('imageio_ffmpeg', reason="needs the extra 'video'")
+    with pytest.raises(SystemExit, match='2'):
+        moving_picture.main([str(tmp_path / 'a.gif'), '--first', '20', '--last', last])
+    assert '--last above it' in capsys.readouterr().err
+
+
 def test_a_report_on_a_full_disk_is_gone_on_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

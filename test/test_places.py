@@ -289,6 +289,10 @@ def test_what_was_not_said_does_not_count_and_what_is_no_covariance_holds_nothin
     assert table is not None
     assert [row[0] for row in table.rows] == ['a, seen', 'a, hidden', 'a, astray', 'a, all']
     assert table.rows[0][2:] == (100.0, pytest.approx(10.0), 0.0, pytest.approx(20.0))
+    assert 'Astray: ' in table.note
+    table = places_table({('a', 's'): [place]})
+    assert table is not None
+    assert 'Astray' not in table.note, 'of which there is no row'
 
 
 def test_the_truth_of_a_velocity_is_that_of_the_places() -> None:

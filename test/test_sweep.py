@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -255,6 +256,10 @@ def test_a_sweep_from_the_command_line(tmp_path: Path, capsys):
     page = (report / 'index.html').read_text()
     assert 'What matters and what is noise' in page
     assert page.count('<img') == 1
+    footer = page[page.index('<footer>') :]
+    assert '<code>settings.csv</code>' in footer
+    for name in re.findall(r'<code>([a-z_.]+)/?</code>', footer):
+        assert (report / name).exists(), name
 
     before = {p: p.stat().st_mtime_ns for p in (report / 'results').rglob('*.csv')}
     assert main([*words, '--report', str(report)]) == 0

@@ -332,6 +332,8 @@ def test_names_that_are_no_utf8(recordings: Path, tmp_path: Path):
         (['normal_0', 'nothing', '--output', 'o'], 'nothing does not exist'),
         (['none_*', '--output', 'o'], 'none_* matches nothing'),
         (['--output', 'o'], 'no recordings'),
+        # --param takes all words behind it
+        (['--output', 'o', '--param', 'acceptance=0.6', 'normal_0'], "--param 'normal_0': write k"),
         (['--list', 'none.txt', '--output', 'o'], 'none.txt does not exist'),
         (['normal_*', '--output', 'o', '--variant', 'deep'], "unknown variant 'deep'"),
         (['normal_*', '--output', 'o', '--param', 'padding=x'], 'padding'),

@@ -251,7 +251,9 @@ def parse_assignments(items: Sequence[str]) -> dict[str, str]:
     for item in items:
         key, equals, value = item.partition('=')
         if not equals or not key:
-            raise ParameterError(f'--param {item!r}: write key=value')
+            raise ParameterError(
+                f'--param {item!r}: write key=value, and what is no parameter before --param'
+            )
         values[key.strip()] = value.strip()
     return values
 

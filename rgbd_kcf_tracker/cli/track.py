@@ -43,6 +43,9 @@ _SAME_TARGET_IOU = 0.5
 ONLY = 1
 """The id of a target that is followed alone, where one is written."""
 
+_NO_TEXT = ('.mp4', '.m4v', '.mov', '.mkv', '.avi', '.webm', '.mcap', '.bag', '.db3')
+"""How names of videos and bags end: text in such a file is a mistake."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options."""
@@ -357,6 +360,15 @@ def _check_outputs(args: argparse.Namespace) -> None:
         del outputs['--output']
     written = {option: path for option, path in outputs.items() if path}
     check_outputs(written, [args.source], args.overwrite)
+    for option, form in (('--output', 'CSV'), ('--mot', 'MOT Challenge text')):
+        path = written.get(option, '')
+        if path.lower().endswith(_NO_TEXT):
+            raise ParameterError(
+                f'{option} {path} would be {form}: by its name it is a video or a bag, which '
+                '--video and --bag write'
+            )
+    if args.bag and not args.bag.endswith('.mcap'):
+        raise RecordingError(f'--bag {args.bag} must end in .mcap: that is the format written')
     if args.video:
         require_video(args.video)
 

@@ -106,6 +106,7 @@ def is_asked(args: argparse.Namespace) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Follow targets through all recordings that are not done yet; returns the exit code."""
+    _check_parameters(args)  # first: --param takes a SOURCE behind it, which would be missed
     require('batch', 'track of several recordings')
     from rgbd_kcf_tracker.recordings.outputs import check_outputs
 
@@ -119,7 +120,6 @@ def run(args: argparse.Namespace) -> int:
     own = jobs if shard is None else shard.of(jobs)
     if args.table == 'parquet':
         require('parquet', '--table parquet')
-    _check_parameters(args)
     read = [*sources, *([args.list] if args.list and args.list != '-' else [])]
     for kind, folder in folders.items():  # each alone: they may be one
         check_outputs({f'--{kind}': folder}, read, overwrite=True, folders=(f'--{kind}',))

@@ -11,6 +11,8 @@ from rgbd_kcf_tracker.evaluation.metrics.ellipsoids import Place, coverage
 from rgbd_kcf_tracker.evaluation.score_tables import scaled
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
 
+_ASTRAY = 'Astray: the box, or the last before it was hidden, was on something else. '
+
 
 def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | None:
     """A row for each tracker while the target is seen, hidden, and for both; None without places.
@@ -38,6 +40,7 @@ def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | N
                 )  # fmt: skip
     if not rows:
         return None
+    astray = any(place.astray for some in places.values() for place in some)
     return Table(
         'places',
         'Places in metres: true ones in the ellipsoid of 95 %',
@@ -47,6 +50,6 @@ def places_table(places: Mapping[tuple[str, str], Sequence[Place]]) -> Table | N
         ),
         tuple(rows),
         note='Of the middle of the body, all frames of all sequences with a place and a covariance '
-        'alike. Calibrated covariances hold 95 %. Astray: the box, or the last before it was '
-        'hidden, was on something else. Errors are root mean squares.',
+        f'alike. Calibrated covariances hold 95 %. {_ASTRAY if astray else ""}Errors are root mean '
+        'squares.',
     )  # fmt: skip

@@ -149,7 +149,10 @@ def _calibration(panels: Sequence[tuple[str, Reliability, str]], across: str, wh
         axes.set_title(f'{name}\nerror {table.expected_error:.3f}', fontsize=9)
         plot_style.tidy(axes)
         if index == 0:
-            axes.legend(fontsize=7, frameon=False, loc='upper left')
+            axes.legend(  # below, as the curve may be anywhere
+                fontsize=7, frameon=False, ncols=2, loc='upper left', bbox_to_anchor=(0, -0.2),
+                borderaxespad=0,
+            )  # fmt: skip
     return plot_style.png(figure)
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     )
     from rgbd_kcf_tracker.recordings.mot import MotWriter, Sightings, read_mot
     from rgbd_kcf_tracker.recordings.opening import open_recording
-    from rgbd_kcf_tracker.recordings.overlay import draw_track
+    from rgbd_kcf_tracker.recordings.overlay import draw_track, draw_tracks
     from rgbd_kcf_tracker.recordings.pairing import Pair, PairingCounts, StampPairer
     from rgbd_kcf_tracker.recordings.recording import (
         ReadOptions,
@@ -62,6 +62,7 @@ __all__ = [
     'decode_compressed_depth',
     'decode_depth',
     'draw_track',
+    'draw_tracks',
     'open_recording',
     'read_mot',
 ]
@@ -80,7 +81,7 @@ __getattr__, __dir__ = lazily(
         'images': 'decode_color decode_compressed_color decode_compressed_depth decode_depth',
         'mot': 'MotWriter Sightings read_mot',
         'opening': 'open_recording',
-        'overlay': 'draw_track',
+        'overlay': 'draw_track draw_tracks',
         'pairing': 'Pair PairingCounts StampPairer',
         'recording': 'ReadOptions Recording RecordingInfo StreamInfo',
         'results': 'TrackCsvWriter TracksCsvWriter',

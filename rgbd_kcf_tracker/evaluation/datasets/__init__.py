@@ -155,7 +155,7 @@ def _walk(path: Path, options: DatasetOptions, depth: int) -> list[Sequence]:
 def _sequences_at(path: Path, options: DatasetOptions, asked: bool) -> list[Sequence]:
     kind = options.kind
     if options.everyone:
-        return everyone.find(path, options.fps) if everyone.is_sequence(path) else []
+        return everyone.find(path, options.fps, asked) if everyone.is_sequence(path) else []
     read = ReadOptions(
         fps=options.fps,
         color_topic=options.color_topic,
@@ -164,7 +164,7 @@ def _sequences_at(path: Path, options: DatasetOptions, asked: bool) -> list[Sequ
     )
     bag = recorded.is_sequence(path) or (asked and recorded.is_named(path))
     if bag and kind in ('auto', recorded.RECORDING):
-        return [recorded.find(path, read)]
+        return [recorded.find(path, read, asked)]
     if not path.is_dir():
         return []
     if kind == 'otb':
@@ -176,7 +176,7 @@ def _sequences_at(path: Path, options: DatasetOptions, asked: bool) -> list[Sequ
         table = path.parent / princeton.CATEGORIES_FILE
         return [princeton.find(path, princeton.read_categories(table))]
     if kind in ('auto', 'folder') and folder.is_sequence(path, kind == 'folder'):
-        return folder.find(path, options.fps)
+        return folder.find(path, options.fps, asked)
     if vot.is_sequence(path) and kind in ('auto', *_SAME_AS_VOT):
         return [vot.find(path, options.fps)]
     return []

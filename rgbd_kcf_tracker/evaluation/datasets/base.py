@@ -28,6 +28,8 @@ CLEAR_FRACTION = 0.5
 
 EVERYONE = 'everyone'
 """Kind of a sequence in which everyone is followed, instead of one target."""
+NO_SCENARIO = '-'
+"""Scenario of recordings that belong to none."""
 BROKEN = 'broken'
 """Kind of a sequence that cannot be read."""
 
@@ -230,11 +232,18 @@ def entries(path: Path) -> list[Path]:
         raise UnreadableError(str(error)) from None
 
 
-def group(path: Path) -> str:
+def group(path: Path, named: bool = False) -> str:
     """The scenario that a recording's name or place tells.
 
     ``occlusion_3`` belongs to ``occlusion``, as ``rgbd-kcf simulate`` names its scenes; any other
-    recording to the folder that it lies in.
+    recording to the folder of the data set that it lies in.
+
+    Args:
+        path: the recording.
+        named: it was named itself, so that its folder says nothing, and a report that is made
+            again elsewhere is the same.
     """
     numbered = re.fullmatch(r'(.+)_\d+', path.stem)
-    return numbered[1] if numbered else path.resolve().parent.name
+    if numbered:
+        return numbered[1]
+    return NO_SCENARIO if named else path.resolve().parent.name

@@ -50,15 +50,15 @@ def is_sequence(path: Path) -> bool:
     return image_folder(path) is not None and bool(_truth_files(path))
 
 
-def find(path: Path, fps: float) -> list[Sequence]:
-    """The one recording of a folder."""
+def find(path: Path, fps: float, named: bool = False) -> list[Sequence]:
+    """The one recording of a folder; see :func:`~.base.group` for ``named``."""
     files = [*_truth_files(path), *sorted(path.glob('visible_*.txt'))]
     files += sorted(path.glob('body_*.txt'))
     names = (*IMAGE_FOLDERS, 'depth', 'timestamps.txt', INTRINSICS, CAMERA_INFO, _INFO)
     return [
         Sequence(
             name=path.name,
-            scenario=group(path),
+            scenario=group(path, named),
             kind=EVERYONE,
             open=partial(load, path, fps),
             identity=f'everyone:{fps}',

@@ -75,10 +75,11 @@ def is_sequence(path: Path, asked: bool = False) -> bool:
     return not (path / 'sequence').is_file() and any((path / n).is_file() for n in _PARTS)
 
 
-def find(path: Path, fps: float) -> list[Sequence]:
+def find(path: Path, fps: float, named: bool = False) -> list[Sequence]:
     """The targets of a folder.
 
-    One per ``groundtruth_PERSON.txt``, else groundtruth.txt's, else one per id in ``mot.txt``.
+    One per ``groundtruth_PERSON.txt``, else groundtruth.txt's, else one per id in ``mot.txt``. See
+    :func:`~.base.group` for ``named``.
     """
     people = people_files(path)
     if not people and not (path / 'groundtruth.txt').is_file() and (path / MOT_FILE).is_file():
@@ -98,7 +99,7 @@ def find(path: Path, fps: float) -> list[Sequence]:
         result.append(
             Sequence(
                 name=f'{path.name}/{person}' if person else path.name,
-                scenario=path.name if person else group(path),
+                scenario=path.name if person else group(path, named),
                 kind='folder',
                 open=partial(load, path, truth, visible, bool(person), fps),
                 identity=f'folder:{fps}',

@@ -50,11 +50,11 @@ def _is_split(folder: Path) -> bool:
     return len(kinds) == 1 and None not in kinds
 
 
-def find(path: Path, options: ReadOptions) -> Sequence:
-    """One bag."""
+def find(path: Path, options: ReadOptions, named: bool = False) -> Sequence:
+    """One bag; see :func:`~.base.group` for ``named``."""
     return Sequence(
         name=path.stem,
-        scenario=group(path),
+        scenario=group(path, named),
         kind=RECORDING,
         open=partial(load, path, options),
         identity=f'recording:{options}',
