@@ -5,16 +5,23 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Frame, Intrinsics
+from rgbd_kcf_tracker import Box, Frame, Intrinsics
 from rgbd_kcf_tracker.bench import auto_init as bench
+from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample
 from rgbd_kcf_tracker.live.auto_init import AutoInit
 from rgbd_kcf_tracker.live.settings import NodeParameters
 from rgbd_kcf_tracker.metric.people import rounded
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.recordings import SequenceWriter
 
 SETTINGS = NodeParameters(auto_init=True)
 
@@ -111,3 +118,46 @@ def test_wrong_arguments_of_the_measurement_are_answered_in_a_sentence(
 ) -> None:
     assert bench.main(given) == 2
     assert said in capsys.readouterr().err
+
+
+def test_who_is_not_chosen_is_not_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cupboard beside somebody was somebody found, and at once."""
+    person, cupboard = Box(20, 10, 20, 60), Box(100, 10, 20, 60)
+    frame = Frame(np.zeros((120, 160, 3), np.uint8), np.full((120, 160), 2.0, np.float32))
+    samples = [
+        Sample(dataclasses.replace(frame, stamp_ns=second * 10**9), None, people=people)
+        for second, people in enumerate([(Annotation(1, person),)] * 4)
+    ]
+    boxes = iter([cupboard, None, person, person])
+    monkeypatch.setattr(bench, 'AutoInit', lambda _: lambda _: next(boxes))
+    tally = bench.judge(samples, SETTINGS)
+    assert (tally.choices, tally.wrong, tally.first, tally.first_wrong) == (3, 1, 1, 1)
+    assert (tally.looks, tally.found) == (4, 2)
+    assert tally.seconds == [2.0]
+
+
+def test_all_recordings_count_and_empty_ones_need_no_truth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of a folder the first alone was looked at."""
+    one = tmp_path / 'people' / 'one'
+    one.parent.mkdir()
+    with SequenceWriter(one) as writer:
+        for sample in bench.rendered('normal', 7, 'people'):
+            writer.write(sample.frame, sample.people[0].box if sample.people else None)
+            if sample.number == 3:
+                break
+    (one / 'groundtruth.txt').rename(one / 'groundtruth_1.txt')
+    shutil.copytree(one, tmp_path / 'people' / 'two')
+    shutil.copytree(one, tmp_path / 'empty')
+    (tmp_path / 'empty' / 'groundtruth_1.txt').unlink()
+    bench.main(['--seeds', '', '--people', str(one.parent), '--empty', str(tmp_path / 'empty')])
+    rows = [re.split(' {2,}', row) for row in capsys.readouterr().out.splitlines()[2:]]
+    scenes = {row[0]: row[1] for row in rows}
+    assert scenes == {'recorded people': '2', 'recorded, empty': '1', 'all': '3'}
+
+
+@pytest.mark.parametrize('fps', ['0', 'nan', '-1'])
+def test_no_frames_a_second_are_refused(fps: str) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        bench.main(['--seeds', '', '--fps', fps])

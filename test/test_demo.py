@@ -19,6 +19,7 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 from rgbd_kcf_tracker import Box, Track, TrackState
+from rgbd_kcf_tracker.bench import demo
 from rgbd_kcf_tracker.bench.demo_pictures import CELL_WIDTH, chosen, contact_sheet, thumbnail
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
@@ -81,6 +82,18 @@ def test_demo_names_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert 'cannot be written' in done.stderr
     assert 'Traceback' not in done.stderr
+
+
+@pytest.mark.parametrize(
+    'words', [['--size', '3'], ['--rate', 'nan'], ['--scenario', 'nix'], ['--seconds', '0']]
+)
+def test_what_the_demo_refuses_leaves_nothing(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It left a folder, and the corrected command said that it was there already."""
+    assert demo.main([str(tmp_path / 'dm'), *words]) == 1
+    assert capsys.readouterr().err.startswith('demo: ')
+    assert not (tmp_path / 'dm').exists()
 
 
 def test_demo_replaces_nothing_unasked(tmp_path: Path) -> None:

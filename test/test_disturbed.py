@@ -72,3 +72,4 @@ def test_nothing_is_written_over_and_what_is_no_recording_is_said(
         '1.png: compressed image of 8 bytes is neither JPEG, PNG nor TIFF'
         in capsys.readouterr().err
     )
+    assert not list((tmp_path / 'other').iterdir()), 'half a copy is none'

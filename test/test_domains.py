@@ -14,8 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from rgbd_kcf_tracker.bench.demo_nodes import kept_to_this_machine
-from rgbd_kcf_tracker.bench.domains import DOMAINS, reserved_domain
+from rgbd_kcf_tracker.bench.domains import DOMAINS, kept_to_this_machine, reserved_domain
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
 HOLD = """

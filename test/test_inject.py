@@ -6,7 +6,10 @@
 from __future__ import annotations
 
 import signal
+import subprocess
+import tempfile
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -100,3 +103,82 @@ def test_it_sees_what_must_not_be(tmp_path: Path) -> None:
     trial.outputs = {'--bag': path.with_suffix('.mcap')}
     (problem,) = inject._of_the_outputs(trial, 0, {})
     assert 'is no recording' in problem
+
+
+@pytest.fixture(scope='module')
+def injector(tmp_path_factory: pytest.TempPathFactory) -> inject.Injector:
+    return inject.Injector(tmp_path_factory.mktemp('inject'), seed=1)
+
+
+def signalled(trial: Trial, kind: str) -> list[str]:
+    """A command that is soon over, and a signal in its midst."""
+    trial.signal, trial.signal_after, trial.fault = signal.SIGKILL, 0.4, f'{kind}: a signal'
+    trial.outputs = {'DEST': trial.out / 'b.mcap'}
+    return ['convert', str(trial.source)]
+
+
+def test_a_signal_comes_while_the_command_runs(
+    injector: inject.Injector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third of them came when it had ended."""
+    monkeypatch.setattr(inject, '_draw', signalled)
+    outcomes = list(injector.trials(0, 6))
+    assert sum(o.code == -signal.SIGKILL for o in outcomes) >= 3, outcomes
+    assert all((o.code == -signal.SIGKILL) != o.late for o in outcomes)
+
+
+def test_a_signal_to_who_has_just_ended_is_late() -> None:
+    process = subprocess.Popen(['true'])
+    process.wait()
+    assert not inject._sent(process.pid, signal.SIGINT)
+
+
+def test_a_circle_is_tried_in_folders_alone(tmp_path: Path) -> None:
+    (tmp_path / 'a.mcap').write_bytes(b'1')
+    seen = Counter[str]()
+    for seed in range(300):
+        trial = Trial(np.random.default_rng(seed), tmp_path / 'a.mcap', tmp_path, '1,2,3,4')
+        with pytest.MonkeyPatch.context() as patch:
+            for faults in (inject.SOURCE_FAULTS, inject.OUTPUT_FAULTS):
+                for name in faults:
+                    patch.setitem(faults, name, lambda _: None)
+            inject._draw(trial, 'mcap')
+        seen[trial.fault] += 1
+    assert seen['mcap: a link to itself']
+    assert not seen['mcap: a folder in a circle'], 'it does nothing there'
+
+
+def test_what_nobody_may_read_is_removed_afterwards(tmp_path: Path) -> None:
+    """By who is not root it could not be, and the run ended with a traceback."""
+    (tmp_path / 'out').mkdir()
+    source = tmp_path / 'source' / 'recording'
+    source.mkdir(parents=True)
+    (source / 'a.txt').write_text('1')
+    source.chmod(0)
+    inject._give_rights_back(tmp_path)
+    assert source.stat().st_mode & 0o777 == 0o700
+
+
+def test_an_interrupted_run_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def trials(*_: object) -> Iterator[inject.Outcome]:
+        yield inject.Outcome(0, ('info',), 'a signal', 0, 0.1, (), '', late=True)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    monkeypatch.setattr(inject, 'materials', lambda _: ({}, ''))
+    monkeypatch.setattr(inject.Injector, 'trials', trials)
+    assert inject.main([]) == 130
+    told = capsys.readouterr().out
+    assert told.startswith('1 trials, 0 failed')
+    assert '1 signals came when the command had ended' in told
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    'words', [['--keep', __file__], ['--seed', '-1'], ['--first', '-1'], ['--count', '0']]
+)
+def test_wrong_arguments_are_refused(words: list[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        inject.main(words)

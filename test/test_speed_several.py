@@ -11,6 +11,7 @@ import io
 import pytest
 
 from rgbd_kcf_tracker import Frame, TargetSet, Track
+from rgbd_kcf_tracker.bench import scaling
 from rgbd_kcf_tracker.cli import bench
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import ParameterError
@@ -135,6 +136,7 @@ def test_bench_reports_by_number_of_targets_and_what_each_further_one_costs(
         (['--lost'], 'of --targets'),
         (['--without-depth'], 'of --targets'),
         (['--targets', '2', '--lost', '--frames', '30'], 'give more than'),
+        (['--sizes', '64x400:400'], 'the target is 152 pixels wide'),
     ],
 )
 def test_wrong_targets_are_answered_in_a_sentence(
@@ -146,3 +148,12 @@ def test_wrong_targets_are_answered_in_a_sentence(
     monkeypatch.setattr(bench, 'THREADS', ())
     assert main(['bench', *words]) == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    'words',
+    [['--scenes', 'nix'], ['--duration', '0'], ['--jobs-each', '0'], ['--job', 'nan']],
+)
+def test_what_scaling_cannot_measure_is_refused(words: list[str]) -> None:
+    with pytest.raises(SystemExit, match='2'):
+        scaling.main(words)

@@ -238,7 +238,7 @@ def test_what_hides_a_thing_is_no_miss(room: Moments):
     for shown, shows in ((frames, True), (covered, False)):
         where = bench.places(shown, thing, [still])[1]
         assert where is not None
-        assert where.shows == shows
+        assert (where.shows, where.hidden) == (shows, not shows)
 
 
 def test_boxes_are_counted_by_where_the_thing_is(room: Moments):
@@ -257,6 +257,13 @@ def test_boxes_are_counted_by_where_the_thing_is(room: Moments):
     assert (other.wrong, other.right, other.missed) == (right.right, 0, 0)
     assert other.sure_wrong == other.sure == right.sure > 0
     assert not other.honest
+    # Of a box at its place nobody knows what it is about while something nearer is before it.
+    hidden = [dataclasses.replace(where, shows=False, hidden=True) for where in wheres]
+    behind = bench.follow(frames, hidden, thing.box)
+    assert (behind.right, behind.wrong, behind.missed, behind.sure) == (0, 0, 0, 0)
+    assert behind.frames == right.missed
+    away = bench.Where(Box(0, 0, 1, 1), False, hidden=True)
+    assert bench.follow(frames, [away] * len(frames), thing.box).wrong == right.right
     nothing = bench.follow(frames, [None] * len(frames), thing.box)
     assert (nothing.frames, nothing.right, nothing.wrong) == (0, 0, 0)
 
@@ -318,6 +325,26 @@ def test_the_command_counts_the_things_of_a_recording(
     assert max(most) < before + 4, 'the recording was held in memory'
     assert bench.main([*line, '--strides', '2']) == 2
     assert 'give --intrinsics' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('hz', 'step'), [(5, 1), (30, 3)])
+def test_the_steps_of_the_truth_are_those_of_the_stamps(
+    hz: int, step: int, folder: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):  # fmt: skip
+    stamps = [round(i * 1e9 / hz) for i in range(20)]
+    (folder / 'timestamps.txt').write_text(''.join(f'{stamp}\n' for stamp in stamps))
+    steps = []
+
+    def stands(frames: Sequence[Frame], step: int) -> list[None]:
+        steps.append(step)
+        return [None] * len(frames)
+
+    monkeypatch.setattr(bench, 'stands', stands)
+    line = [str(folder), '--things', str(folder.parent / 'things.csv')]
+    assert bench.main([*line, '--intrinsics', '262,262,160,120', '--fps', '7']) == 2
+    assert 'room: nothing is judged' in capsys.readouterr().err
+    assert steps == [step, 2 * step]
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,8 @@ from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image
 from rgbd_kcf_tracker.bench.altered import (
     add_reading,
     camera_of,
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     read_with_depth,
     write_camera,
@@ -177,13 +177,13 @@ def aim(frames: ImageFrames, people: everyone.People, out: Path, views: Sequence
     ]
     if not any(truth):
         return False
-    make_copy(out, 'rgb', 'depth')
-    for index, view in enumerate(views):
-        frame = frames.frame(index)
-        assert frame.depth is not None
-        write_pair(out, index + 1, *view.shown(frame.color, frame.depth))
-    write_truth(out, frames.stamps_ns, truth)
-    write_camera(out, views[0].camera)
+    with new_copy(out, 'rgb', 'depth'):
+        for index, view in enumerate(views):
+            frame = frames.frame(index)
+            assert frame.depth is not None
+            write_pair(out, index + 1, *view.shown(frame.color, frame.depth))
+        write_truth(out, frames.stamps_ns, truth)
+        write_camera(out, views[0].camera)
     return True
 
 

@@ -9,8 +9,10 @@ import argparse
 import dataclasses
 import json
 import math
+import shutil
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
@@ -98,16 +100,28 @@ def write_copies(out: Path, folders: list[Path], write: Callable[[], Iterable[st
     return 0
 
 
-def make_copy(out: Path, *parts: str) -> None:
-    """Make the folders of a copy, which must not be there, and the one that it lies in.
+@contextmanager
+def new_copy(out: Path, *parts: str) -> Iterator[None]:
+    """Make the folders of a copy, which is written in the ``with`` block.
+
+    Where that fails it is removed: half of one would be in the way of the next run.
+
+    Args:
+        out: the copy, which must not be there; the folder that it lies in is made.
+        parts: the folders in it.
 
     Raises:
-        RgbdKcfError: where it is, or they cannot be made.
+        RgbdKcfError: where it is there, or they cannot be made.
     """
     if out.exists():
         raise RecordingError(f'{out} is there already: give another --out')
-    for part in (out.parent, out, *(out / name for name in parts)):
-        make_folder(part)
+    try:
+        for part in (out.parent, out, *(out / name for name in parts)):
+            make_folder(part)
+        yield
+    except BaseException:
+        shutil.rmtree(out, ignore_errors=True)
+        raise
 
 
 def write_image(path: Path, image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> None:

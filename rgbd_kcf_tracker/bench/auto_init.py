@@ -28,12 +28,15 @@ from rgbd_kcf_tracker.cli.common import parse_intrinsics
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample, with_intrinsics
+from rgbd_kcf_tracker.evaluation.datasets.base import Sequence as DatasetSequence
 from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
 from rgbd_kcf_tracker.evaluation.table import Cell, Table
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.live.auto_init import AutoInit
 from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.recordings import ReadOptions, open_recording
+from rgbd_kcf_tracker.recordings.recording import MAX_FPS, MIN_FPS
 from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.simulation.actors import PersonActor, VisitorActor
 from rgbd_kcf_tracker.simulation.materials import wallpaper
@@ -73,8 +76,10 @@ class Chosen:
         scenes: how many.
         choices, wrong: boxes that were chosen; of those that are nobody's.
         first, first_wrong: the same of the first choice of each scene.
-        looks, found: frames with somebody in range and in clear view, and of those with a choice.
-        seconds: until the first choice, from the first such frame, of each scene that had both.
+        looks, found: frames with somebody in range and in clear view, and of those with a choice
+            that is right.
+        seconds: until the first choice that is right, from the first such frame, of each scene that
+            had both, in this order.
     """
 
     scenes: int = 0
@@ -117,7 +122,7 @@ def judge(samples: Iterable[Sample], settings: NodeParameters) -> Chosen:
     """Let auto_init choose from frame to frame, and hold each choice against the truth."""
     tally, choose = Chosen(scenes=1), AutoInit(settings)
     begun: int | None = None
-    waiting = True
+    waiting = seeking = True
     for sample in samples:
         frame = sample.frame
         clear = any(_in_range(p, frame, settings) for p in sample.people)
@@ -132,10 +137,12 @@ def judge(samples: Iterable[Sample], settings: NodeParameters) -> Chosen:
         right = any(box.iou(p.box) >= RIGHT for p in sample.people if p.id >= 0)
         tally.choices += 1
         tally.wrong += not right
-        tally.found += clear
+        tally.found += clear and right
         if waiting:
             waiting = False
             tally.first, tally.first_wrong = 1, int(not right)
+        if seeking and right:
+            seeking = False
             if begun is not None:
                 tally.seconds.append((frame.stamp_ns - begun) * 1e-9)
     return tally
@@ -238,14 +245,24 @@ def _print(rng: np.random.Generator, wide: float, high: float, camera: Intrinsic
 # --- recordings --------------------------------------------------------------------------------
 
 
-def recorded(text: str, fps: float, camera: Intrinsics | None, empty: bool) -> Iterator[Sample]:
-    """A folder's samples, with the truth about everyone, or nobody in it."""
-    for sequence in open_dataset(text, DatasetOptions(fps=fps, everyone=not empty))[:1]:
-        samples: Iterable[Sample] = sequence.open().samples
-        if camera is not None:
-            samples = with_intrinsics(samples, camera)
-        for sample in samples:
-            yield dataclasses.replace(sample, people=()) if empty else sample
+def recorded_people(
+    text: str, fps: float, camera: Intrinsics | None
+) -> Iterator[tuple[str, Iterator[Sample]]]:
+    """The recordings of a folder, each with its name and the truth about everyone."""
+    for sequence in open_dataset(text, DatasetOptions(fps=fps, everyone=True)):
+        yield sequence.name, _samples(sequence, camera)
+
+
+def _samples(sequence: DatasetSequence, camera: Intrinsics | None) -> Iterator[Sample]:
+    samples = sequence.open().samples  # only when they are asked for: there may be many
+    yield from samples if camera is None else with_intrinsics(samples, camera)
+
+
+def recorded_empty(text: str, fps: float, camera: Intrinsics | None) -> Iterator[Sample]:
+    """A recording in which nobody is, which needs no truth."""
+    with open_recording(text, ReadOptions(fps=fps, intrinsics=camera)) as recording:
+        for number, frame in enumerate(recording.frames()):
+            yield Sample(frame, None, number=number)
 
 
 # --- the command -------------------------------------------------------------------------------
@@ -265,8 +282,10 @@ def measured(args: argparse.Namespace) -> tuple[Chosen, list[tuple[Cell, ...]]]:
             for scenario in scenarios
             for seed in seeds
         ]
-    kinds['recorded people'] = [(f, recorded(f, args.fps, camera, False)) for f in args.people]
-    kinds['recorded, empty'] = [(f, recorded(f, args.fps, camera, True)) for f in args.empty]
+    kinds['recorded people'] = [
+        scene for f in args.people for scene in recorded_people(f, args.fps, camera)
+    ]
+    kinds['recorded, empty'] = [(f, recorded_empty(f, args.fps, camera)) for f in args.empty]
     total, rows = Chosen(), []
     for kind, scenes in kinds.items():
         tally = Chosen()
@@ -298,6 +317,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--fps', type=float, default=5.0, help='of the recordings')
     parser.add_argument('--intrinsics', metavar='FX,FY,CX,CY', help="the recordings' camera")
     args = parser.parse_args(argv)
+    if not MIN_FPS <= args.fps <= MAX_FPS:
+        parser.error(f'--fps must be a number from {MIN_FPS:g} to {MAX_FPS:g}')
     try:
         total, rows = measured(args)
     except RgbdKcfError as error:

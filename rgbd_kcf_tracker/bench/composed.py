@@ -31,8 +31,8 @@ from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image, Mask
 from rgbd_kcf_tracker.bench.altered import (
     add_reading,
     camera_of,
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     read_with_depth,
     write_camera,
@@ -522,11 +522,11 @@ def compose(source: Source, wish: Wish, seed: int, out: Path) -> int:
     truth = [truth_of(source.room, some) for some in there]
     if not any(truth):
         raise RecordingError(f'{out}: nobody comes in {wish.length} frames: give more as --length')
-    make_copy(out, 'rgb', 'depth')
-    for number, some in enumerate(there, start=1):
-        write_pair(out, number, *picture(source.room, some, rng))
-    write_truth(out, [frame * source.step_ns for frame in range(wish.length)], truth)
-    write_camera(out, source.camera)
+    with new_copy(out, 'rgb', 'depth'):
+        for number, some in enumerate(there, start=1):
+            write_pair(out, number, *picture(source.room, some, rng))
+        write_truth(out, [frame * source.step_ns for frame in range(wish.length)], truth)
+        write_camera(out, source.camera)
     return len(visits)
 
 

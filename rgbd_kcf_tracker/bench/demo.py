@@ -17,17 +17,21 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
-from rgbd_kcf_tracker.bench.demo_nodes import DemoError, kept_to_this_machine, last_line, node
+from rgbd_kcf_tracker.bench.demo_nodes import DemoError, last_line, node
+from rgbd_kcf_tracker.bench.domains import kept_to_this_machine
 from rgbd_kcf_tracker.cli.common import add_overwrite_option
 from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.recordings.outputs import check_outputs
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, VARIANTS
+
+if TYPE_CHECKING:
+    from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
 
 SCENARIO, SEED = 'occlusion', 4
 STARTUP_S = 60.0
@@ -84,6 +88,7 @@ def _demo(options: argparse.Namespace) -> None:
     dest: Path = options.dest
     logs = dest / 'log'
     check_outputs({'DEST': dest}, overwrite=options.overwrite, folders=('DEST',))
+    sequence = _sequence(options)  # before anything is made: what is refused leaves nothing
     try:
         logs.mkdir(parents=True, exist_ok=True)
         for old in logs.glob('*.log'):
@@ -92,7 +97,7 @@ def _demo(options: argparse.Namespace) -> None:
         raise DemoError(f'{dest} cannot be written: {error.strerror or error}') from None
     bag = dest / 'recording.mcap'
     with kept_to_this_machine(logs):
-        truth = _simulate(options, bag)
+        truth = _simulate(sequence, bag)
         lockstep = _run(options, truth, bag, logs, lockstep=True, record=dest / 'tracker.mcap')
         live = _run(options, truth, bag, logs, lockstep=False, record=None)
     ordered = [lockstep.tracks.get(stamp) for stamp in truth.stamps]
@@ -113,10 +118,14 @@ def _demo(options: argparse.Namespace) -> None:
     print(f'\nSee it in a browser: {shown} view {bag} --variant {options.variant}')
 
 
-def _simulate(options: argparse.Namespace, bag: Path) -> Truth:
+def _sequence(options: argparse.Namespace) -> SimulatedSequence:
+    """What is to be rendered.
+
+    Raises:
+        RgbdKcfError: for options of which no recording is made.
+    """
     from rgbd_kcf_tracker.cli.common import parse_size
     from rgbd_kcf_tracker.errors import ParameterError
-    from rgbd_kcf_tracker.recordings import KINECT2_QHD, BagWriter
     from rgbd_kcf_tracker.simulation import simulate
 
     try:
@@ -126,6 +135,17 @@ def _simulate(options: argparse.Namespace, bag: Path) -> Truth:
     sequence = simulate(
         options.scenario, options.seed, options.rate, options.seconds, (width, height)
     )
+    if sequence[0].visible is None:
+        raise DemoError(
+            f'seed {options.seed} of {options.scenario} begins with the target hidden: '
+            'choose another'
+        )
+    return sequence
+
+
+def _simulate(sequence: SimulatedSequence, bag: Path) -> Truth:
+    from rgbd_kcf_tracker.recordings import KINECT2_QHD, BagWriter
+
     truth = Truth([], [], [])
     with BagWriter(bag, KINECT2_QHD, overwrite=True) as writer:
         for made in _progress(sequence, len(sequence), '1/4 simulate a Kinect V2'):
@@ -134,11 +154,6 @@ def _simulate(options: argparse.Namespace, bag: Path) -> Truth:
             truth.stamps.append(made.frame.stamp_ns)
             truth.visible.append(made.visible)
             truth.body.append(made.body)
-    if truth.visible[0] is None:
-        raise DemoError(
-            f'seed {options.seed} of {options.scenario} begins with the target hidden: '
-            'choose another'
-        )
     return truth
 
 

@@ -1,12 +1,11 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The demo's nodes as processes of their own, apart from any other ROS on the network."""
+"""The demo's nodes as processes of their own."""
 
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -14,7 +13,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from rgbd_kcf_tracker.bench.domains import reserved_domain
 from rgbd_kcf_tracker.errors import RgbdKcfError
 
 STOP_S = 20.0
@@ -22,22 +20,6 @@ STOP_S = 20.0
 
 class DemoError(RgbdKcfError):
     """A step of the demo failed."""
-
-
-@contextmanager
-def kept_to_this_machine(log_folder: Path) -> Iterator[None]:
-    """Set this process's ROS environment, which its children take over.
-
-    A domain of its own, this host only, found without multicast too (containers often have none),
-    and logs beside the results instead of in the home folder.
-    """
-    with reserved_domain() as domain:
-        os.environ['ROS_DOMAIN_ID'] = str(domain)
-        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        os.environ['ROS_STATIC_PEERS'] = '127.0.0.1'
-        os.environ['ROS_LOG_DIR'] = str(log_folder)
-        os.environ.pop('ROS_LOCALHOST_ONLY', None)
-        yield
 
 
 @contextmanager

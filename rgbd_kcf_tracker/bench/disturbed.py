@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 from rgbd_kcf_tracker.bench.altered import (
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     write_copies,
     write_image,
@@ -57,20 +57,20 @@ def disturb(folder: Path, out: Path, rng: np.random.Generator) -> int:
     frames = read_frames(folder, image_files(colors), fps=1.0)
     files = [p for p in (*folder.iterdir(), folder / CHALLENGE_FILE) if p.is_file()]
     beside = {p.parent.name for p in files if p.parent != folder}
-    make_copy(out, colors.name, 'depth', *beside)
-    for path in files:
-        shutil.copyfile(path, out / path.relative_to(folder))
-    green = STRONGER * rng.standard_normal()
-    blue, red = green + TINTED * rng.standard_normal(2)
-    gain = np.exp([blue, green, red])
-    for index, path in enumerate(frames.colors):
-        frame = frames.frame(index)
-        assert frame.depth is not None
-        color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
-        noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
-        levels = np.clip(np.rint(color), 0, 255).astype(np.uint8)
-        write_image(out / colors.name / f'{path.stem}.png', levels)
-        write_image(out / 'depth' / f'{path.stem}.png', millimetres(frame.depth + noise))
+    with new_copy(out, colors.name, 'depth', *beside):
+        for path in files:
+            shutil.copyfile(path, out / path.relative_to(folder))
+        green = STRONGER * rng.standard_normal()
+        blue, red = green + TINTED * rng.standard_normal(2)
+        gain = np.exp([blue, green, red])
+        for index, path in enumerate(frames.colors):
+            frame = frames.frame(index)
+            assert frame.depth is not None
+            color = frame.color * gain + COLOR_NOISE * rng.standard_normal(frame.color.shape)
+            noise = DEPTH_NOISE * np.square(frame.depth) * rng.standard_normal(frame.depth.shape)
+            levels = np.clip(np.rint(color), 0, 255).astype(np.uint8)
+            write_image(out / colors.name / f'{path.stem}.png', levels)
+            write_image(out / 'depth' / f'{path.stem}.png', millimetres(frame.depth + noise))
     return len(frames)
 
 
@@ -88,6 +88,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         for copy in range(1, args.copies + 1):
             for index, (folder, name) in enumerate(zip(args.folders, names, strict=True)):
                 out = args.out / f'{copy}_{name}'
+                # By its place on the line, as the documented copies were: two calls share draws.
                 rng = np.random.default_rng([args.seed, copy, index])
                 yield f'{out}: {disturb(folder, out, rng)} pairs'
 

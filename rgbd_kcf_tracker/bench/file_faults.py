@@ -38,7 +38,7 @@ class Trial:
         outputs: what the command shall write, by option.
         fault: what befell it, in words.
         file_limit: bytes after which a written file meets a full disk.
-        signal_after: seconds after which it is signalled.
+        signal_after: share of the time that it takes undisturbed after which it is signalled.
         signal: which one, 0 for none.
         without_rights: whether the rights of files hold for it, also where it is run by root.
     """
@@ -240,8 +240,7 @@ def _folder_for_file(trial: Trial) -> None:
 
 
 def _folder_in_a_circle(trial: Trial) -> None:
-    if trial.source.is_dir():
-        (trial.source / 'again').symlink_to(trial.source)
+    (trial.source / 'again').symlink_to(trial.source)
 
 
 def _unreadable(trial: Trial) -> None:
@@ -288,6 +287,10 @@ SOURCE_FAULTS: dict[str, Fault] = {
     'hidden files beside': _hidden_beside,
     'line ends of another system': _line_ends,
 }
+
+
+OF_FOLDERS = ('a folder in a circle',)
+"""What befalls no source that is a single file."""
 
 
 # -- of what is written ------------------------------------------------------------------------

@@ -18,6 +18,7 @@ failed.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import hashlib
 import multiprocessing
 import os
@@ -37,6 +38,7 @@ from pathlib import Path
 import numpy as np
 
 from rgbd_kcf_tracker.bench.file_faults import (
+    OF_FOLDERS,
     OUTPUT_FAULTS,
     READING_OPTIONS,
     SOURCE_FAULTS,
@@ -80,6 +82,7 @@ class Outcome:
         seconds: that it took.
         problems: what must not be; empty where all is well.
         said: the end of what it printed on standard error.
+        late: whether a signal was to come, and it had ended before.
     """
 
     number: int
@@ -89,6 +92,7 @@ class Outcome:
     seconds: float
     problems: tuple[str, ...]
     said: str
+    late: bool = False
 
 
 class Injector:
@@ -128,39 +132,66 @@ class Injector:
         words = [*command, *trial.words]
         for option, path in trial.outputs.items():
             words += [option, str(path)] if option.startswith('--') else [str(path)]
-        code, seconds, said = self._run(words, trial, place)
-        _give_rights_back(place)
+        try:
+            if trial.signal:
+                trial.signal_after *= self._usual_time(words, trial, place)
+            code, seconds, said, late = self._run(words, trial, place)
+            after = _looked_at(place / 'source')  # with the rights with which it was looked at
+        finally:
+            _give_rights_back(place)
         problems = [
             *_of_the_end(trial, code, seconds, said),
-            *_of_the_source(before, _looked_at(place / 'source')),
+            *_of_the_source(before, after),
             *_of_the_outputs(trial, code, old),
         ]
         if not problems:
             shutil.rmtree(place)
         return Outcome(
-            number, tuple(words), trial.fault, code, seconds, tuple(problems), said[-2000:]
+            number, tuple(words), trial.fault, code, seconds, tuple(problems), said[-2000:], late
         )
 
-    def _run(self, words: list[str], trial: Trial, place: Path) -> tuple[int | None, float, str]:
+    def _usual_time(self, words: list[str], trial: Trial, place: Path) -> float:
+        """Seconds that a command takes that is left alone, here and now; it leaves nothing."""
+        _, seconds, _, _ = self._run(words, dataclasses.replace(trial, signal=0), place)
+        shutil.rmtree(trial.out)
+        trial.out.mkdir()
+        (place / 'said').unlink(missing_ok=True)
+        return seconds
+
+    def _run(
+        self, words: list[str], trial: Trial, place: Path
+    ) -> tuple[int | None, float, str, bool]:
+        """Its exit code, None where it hung; seconds; what it said; whether a signal was late."""
         log = place / 'said'
         process = self._context.Process(
             target=_command, args=(words, log, trial.file_limit, trial.without_rights)
         )
-        begun = time.monotonic()
         process.start()
+        while process.is_alive() and not log.exists():
+            time.sleep(0.005)  # until it is the command
+        begun = time.monotonic()
+        late = False
         if trial.signal:
-            while process.is_alive() and not log.exists():
-                time.sleep(0.005)  # until it is the command
             process.join(trial.signal_after)
-            if process.is_alive() and process.pid is not None:
-                os.kill(process.pid, trial.signal)
+            late = not _sent(process.pid if process.is_alive() else None, trial.signal)
         process.join(LIMIT_S)
         hung = process.is_alive()
         if hung:
             process.kill()
             process.join()
         said = log.read_bytes().decode('utf-8', 'replace') if log.exists() else ''
-        return (None if hung else process.exitcode), time.monotonic() - begun, said
+        return (None if hung else process.exitcode), time.monotonic() - begun, said, late
+
+
+def _sent(pid: int | None, number: int) -> bool:
+    """Signal a process; False where it is gone."""
+    if pid is None:
+        return False
+    try:
+        os.kill(pid, number)
+    except ProcessLookupError:  # it ended in this moment
+        return False
+    return True
 
 
 def _draw(trial: Trial, kind: str) -> list[str]:
@@ -178,7 +209,8 @@ def _draw(trial: Trial, kind: str) -> list[str]:
         trial.outputs = {'DEST': out / 'b.mcap'}
     elif command == 'evaluate':
         trial.outputs = {'--report': out / 'report'}
-    faults = dict(SOURCE_FAULTS)
+    folder = trial.source.is_dir()
+    faults = {name: f for name, f in SOURCE_FAULTS.items() if folder or name not in OF_FOLDERS}
     if command in ('track', 'convert'):
         faults |= OUTPUT_FAULTS
     options = READING_OPTIONS if command != 'evaluate' else {'--fps': 1, '--intrinsics': 4}
@@ -190,7 +222,7 @@ def _draw(trial: Trial, kind: str) -> list[str]:
     trial.fault = names[int(rng.integers(len(names)))]
     if trial.fault == 'a signal':
         trial.signal = int(SIGNALS[int(rng.integers(len(SIGNALS)))])
-        trial.signal_after = float(rng.uniform(0, 0.6))
+        trial.signal_after = float(rng.uniform(0, 0.9))
     else:
         faults[trial.fault](trial)
     trial.fault = f'{kind}: {trial.fault}'
@@ -313,14 +345,17 @@ def _looked_at(place: Path) -> dict[str, str]:
 
 
 def _give_rights_back(place: Path) -> None:
-    place.joinpath('out').chmod(0o700)
+    """So that all of a trial can be removed, also by who is not root."""
+    for path in (place / 'out', *place.joinpath('source').iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            path.chmod(0o700)
 
 
 # -- the command -------------------------------------------------------------------------------
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run trials, print those that failed, and end with 1 where one did."""
+    """Run trials and print those that failed; status 1 where one did, 130 where interrupted."""
     parser = argparse.ArgumentParser(
         prog='python -m rgbd_kcf_tracker.bench.inject',
         description='Try faults of files, disks and signals on every command.',
@@ -332,16 +367,23 @@ def main(argv: list[str] | None = None) -> int:
         '--keep', type=Path, metavar='DIR', help='keep what failed there (default: thrown away)'
     )
     options = parser.parse_args(argv)
-    if options.keep is not None:
-        options.keep.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix='inject_', dir=options.keep))
-    failed = 0
+    if options.count < 1 or min(options.first, options.seed) < 0:
+        parser.error('--count must be 1 or more, --first and --seed 0 or more')
+    try:
+        if options.keep is not None:
+            options.keep.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix='inject_', dir=options.keep))
+    except OSError as error:
+        parser.error(f'{options.keep or tempfile.gettempdir()}: {error.strerror or error}')
+    failed = late = 0
+    interrupted = False
     slowest = 0.0
     codes: dict[int | None, int] = {}
     try:
         for outcome in Injector(folder, options.seed).trials(options.first, options.count):
             codes[outcome.code] = codes.get(outcome.code, 0) + 1
             slowest = max(slowest, outcome.seconds)
+            late += outcome.late
             if not outcome.problems:
                 continue
             failed += 1
@@ -352,12 +394,17 @@ def main(argv: list[str] | None = None) -> int:
             sys.stdout.flush()
     except KeyboardInterrupt:
         print('interrupted', file=sys.stderr)
+        interrupted = True
     finally:
         if options.keep is None or not failed:
             with suppress(OSError):
                 shutil.rmtree(folder)
     ends = ', '.join(f'{count} with {code}' for code, count in sorted(codes.items(), key=str))
     print(f'{sum(codes.values())} trials, {failed} failed; ended {ends}; slowest {slowest:.1f} s')
+    if late:
+        print(f'{late} signals came when the command had ended, and tried nothing')
+    if interrupted:
+        return 130
     return 1 if failed else 0
 
 

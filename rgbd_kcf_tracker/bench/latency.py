@@ -15,14 +15,17 @@ from __future__ import annotations
 import argparse
 import math
 import socket
+import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from rgbd_kcf_tracker.bench.camera import BLOCK, NAMESPACE, SCENARIO, SEED, SIZES, START
+from rgbd_kcf_tracker.bench.domains import kept_to_this_machine
 from rgbd_kcf_tracker.bench.figures import add_output_options, check_output, write_output
 from rgbd_kcf_tracker.bench.rig import Listener, child, cpu_seconds, environment
 from rgbd_kcf_tracker.errors import RgbdKcfError
@@ -91,7 +94,7 @@ def measure(
     """Run one case, with a viewer beside it where browsers are to look.
 
     Raises:
-        RuntimeError: where one of the nodes answers nothing.
+        RuntimeError: where one of the nodes answers nothing, or ends.
     """
     count = round(seconds * rate) + WARM_UP
     env = environment(with_profile)
@@ -115,15 +118,18 @@ def measure(
                 child('rgbd_kcf_tracker.bench.camera', *camera_arguments, env=env)
             )
             begin: tuple[float, float] | None = None
-            while camera.poll() is None and tracker.poll() is None:
+            nodes = {'tracker': tracker, 'wire': wire}
+            while camera.poll() is None and not _ended(nodes):
                 listener.spin(0.2)
                 if begin is None and listener.arrivals and listener.wire:
                     begin = cpu_seconds(tracker.pid), cpu_seconds(wire.pid)
+            still = time.monotonic() + 2.5  # for the last diagnostics
+            while time.monotonic() < still and not _ended(nodes):
+                listener.spin(0.2)
+            if ended := _ended(nodes):
+                raise RuntimeError(ended)
             if begin is None:
                 raise RuntimeError('the tracker or the wire answered nothing')
-            still = time.monotonic() + 2.5  # for the last diagnostics
-            while time.monotonic() < still:
-                listener.spin(0.2)
             end = cpu_seconds(tracker.pid), cpu_seconds(wire.pid)
     finally:
         listener.close()
@@ -144,6 +150,15 @@ def measure(
             for name, value in diagnostics.items()
             if name.endswith(('_median_ms', '_p99_ms'))
         },
+    )
+
+
+def _ended(nodes: Mapping[str, subprocess.Popen[bytes]]) -> str:
+    """What to say of nodes that are no more; '' while all are there."""
+    return ', '.join(
+        f'the {name} ended with status {node.returncode}'
+        for name, node in nodes.items()
+        if node.poll() is not None
     )
 
 
@@ -231,8 +246,34 @@ def histogram(result: Result) -> str:
     return '\n'.join(lines)
 
 
+def _measured(options: argparse.Namespace, results: list[Result]) -> bool:
+    """Add each case that was asked for to the results; False where one cannot be measured."""
+    for variant in options.variants:
+        for size in options.sizes:
+            print(f'{variant} at {size}, {options.seconds:g} s ...', file=sys.stderr)
+            try:
+                results.append(
+                    measure(
+                        variant,
+                        size,
+                        options.rate,
+                        options.seconds,
+                        not options.no_profile,
+                        options.browsers,
+                    )
+                )
+            except RuntimeError as error:
+                print(f'{variant} at {size}: {error}', file=sys.stderr)
+                return False
+    return True
+
+
 def main(args: list[str] | None = None) -> int:
-    """Measure, print the table and the histograms; status 1 where a pair was not answered."""
+    """Measure, print the table and the histograms.
+
+    Returns:
+        The exit status: 1 where a pair was not answered, 2 where a node ended or none was.
+    """
     parser = argparse.ArgumentParser(
         prog='python -m rgbd_kcf_tracker.bench.latency',
         description=(__doc__ or '').split('\n')[0],
@@ -250,32 +291,25 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--no-profile', action='store_true', help="use DDS's default transports")
     add_output_options(parser)
     options = parser.parse_args(args)
+    # Processor time is counted from the second block on: in the first the nodes still start up.
+    least = BLOCK - WARM_UP + 1
+    if not (0 < options.rate < math.inf and least <= options.seconds * options.rate < math.inf):
+        parser.error(f'--seconds and --rate must be numbers that give {least} pairs or more')
+    results: list[Result] = []
+    failed = False
     try:
         check_output(options)
+        with kept_to_this_machine():
+            failed = not _measured(options, results)
+        if results:
+            print(table(results))
+        for result in results:
+            print('\n' + histogram(result))
+        write_output(options, [asdict(r) for r in results])
     except RgbdKcfError as error:
         parser.error(str(error))
-    results = []
-    for variant in options.variants:
-        for size in options.sizes:
-            print(f'{variant} at {size}, {options.seconds:g} s ...', file=sys.stderr)
-            try:
-                results.append(
-                    measure(
-                        variant,
-                        size,
-                        options.rate,
-                        options.seconds,
-                        not options.no_profile,
-                        options.browsers,
-                    )
-                )
-            except RuntimeError as error:
-                print(f'{variant} at {size}: {error}', file=sys.stderr)
-                return 2
-    print(table(results))
-    for result in results:
-        print('\n' + histogram(result))
-    write_output(options, [asdict(r) for r in results])
+    if failed:
+        return 2
     return 0 if all(r.tracker.answered == r.sent for r in results) else 1
 
 

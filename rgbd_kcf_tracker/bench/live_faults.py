@@ -44,7 +44,9 @@ from sensor_msgs.msg import CameraInfo, Image, RegionOfInterest
 from std_msgs.msg import Header, UInt32
 from std_srvs.srv import Trigger
 
+from rgbd_kcf_tracker.bench.domains import kept_to_this_machine
 from rgbd_kcf_tracker.bench.rig import environment, resident_mb
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.live.settings import READ_ONLY, all_parameters
 from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.ros.messages import image_message, stamp_from_ns, stamp_to_ns
@@ -149,7 +151,7 @@ class Target:
         return self._log.read_text(encoding='utf-8', errors='replace')[-500:]
 
     def _internal_errors(self) -> str:
-        """What the log says of them: later faults take their place in the diagnostics."""
+        """What the log says of them, which keeps those that diagnostics no longer name."""
         lines = self._log.read_text(encoding='utf-8', errors='replace').splitlines()
         return '\n'.join(line[:500] for line in lines if 'internal error' in line)
 
@@ -157,6 +159,9 @@ class Target:
         text = self._log.read_text(encoding='utf-8', errors='replace')
         if 'Traceback' in text:
             raise FaultFound(f'it printed a traceback: {text[text.index("Traceback") :][:2000]}')
+        # Diagnostics come once a second: what goes wrong just before an end is told here alone.
+        if errors := self._internal_errors():
+            raise FaultFound(errors)
 
     def close(self) -> None:
         """End everything."""
@@ -265,10 +270,9 @@ class Target:
                 raise FaultFound(f'the node ended by itself: {self.last_words()}')
             if time.monotonic() > end:
                 raise FaultFound(f'a good pair was not answered; diagnostics {self.values}')
+        self._check_log()
         if int(self.values.get('internal_errors', 0)):
-            raise FaultFound(
-                self._internal_errors() or f'internal error, not logged: {self.values}'
-            )
+            raise FaultFound(f'internal error, not logged: {self.values}')
         assert self.process is not None
         grown = resident_mb(self.process.pid) - self.settled_mb
         if self.settled_mb and grown > GROWTH_MB:
@@ -315,13 +319,15 @@ def lying_images(at: Target) -> None:
 
 
 def corrupt_bytes(at: Target) -> None:
-    """Messages whose serialised bytes are cut off or flipped."""
+    """Messages whose serialised bytes are flipped, and half of them cut off as well."""
     for publisher, message in zip((at.color, at.depth), at.pair(), strict=True):
         raw = bytearray(serialize_message(message))
         head = min(len(raw), 100)
         for _ in range(int(at.rng.integers(1, 8))):
             raw[int(at.rng.integers(4, head))] ^= int(at.rng.integers(1, 256))
-        publisher.publish(bytes(raw[: int(at.rng.integers(20, len(raw) + 1))]))
+        # One that is cut off never reaches the node: its middleware cannot read it.
+        cut = at.rng.random() < 0.5
+        publisher.publish(bytes(raw[: int(at.rng.integers(20, len(raw)))] if cut else raw))
 
 
 def odd_stamps(at: Target) -> None:
@@ -573,7 +579,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--faults', type=int, default=500, help='how many')
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args(arguments)
-    outcome = inject(options.faults, options.seed, lambda text: print(text, flush=True))
+    if options.faults < 1 or options.seed < 0:
+        parser.error('--faults must be 1 or more, and --seed 0 or more')
+    try:
+        with kept_to_this_machine():
+            outcome = inject(options.faults, options.seed, lambda text: print(text, flush=True))
+    except RgbdKcfError as error:
+        parser.error(str(error))
     for name, count in sorted(outcome.done.items()):
         print(f'{count:6d} {name}')
     print(f'{sum(outcome.done.values())} faults, {len(outcome.found)} not survived')

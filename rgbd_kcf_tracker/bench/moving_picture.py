@@ -73,11 +73,15 @@ def main(args: list[str] | None = None) -> int:
     parser.add_argument('--last', type=int, default=84, help='frame to stop before')
     add_overwrite_option(parser, 'the file if it is there')
     options = parser.parse_args(args)
+    if not 0 <= options.first < options.last:
+        parser.error('--first must be 0 or more, and --last above it')
     try:
         check_outputs({'dest': options.dest}, overwrite=options.overwrite)
     except RecordingError as error:
         parser.error(str(error))
     frames = list(pictures(options.first, options.last))
+    if not frames:
+        parser.error(f'the scene ends before --first {options.first}')
     height, width = frames[0].shape[:2]
     palette = (
         f'split[a][b];[a]palettegen=max_colors={COLORS}:stats_mode=diff[p];'

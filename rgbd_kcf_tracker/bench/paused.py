@@ -22,8 +22,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rgbd_kcf_tracker.bench.altered import (
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     write_copies,
     write_truth,
@@ -50,23 +50,23 @@ def pause(
     Raises:
         RgbdKcfError: where it is there, or cannot be made.
     """
-    make_copy(out, 'rgb', 'depth')
-    stamps: list[int] = []
-    late = 0
-    for number, index in enumerate(kept):
-        for source, part in ((frames.colors[index], 'rgb'), (frames.depths[index], 'depth')):
-            assert source is not None
-            shutil.copyfile(source, out / part / f'{number + 1:06d}{source.suffix}')
-        if number and index > kept[number - 1] + 1:
-            late = shift_ns
-        elif number and index < kept[number - 1]:
-            late = stamps[-1] + shift_ns - frames.stamps_ns[index]
-        stamps.append(frames.stamps_ns[index] + late)
-    write_truth(out, stamps, [people.get(index, ()) for index in kept])
-    for name in (INTRINSICS, CAMERA_INFO):
-        beside = frames.colors[0].parent.parent / name
-        if beside.is_file():
-            shutil.copyfile(beside, out / name)
+    with new_copy(out, 'rgb', 'depth'):
+        stamps: list[int] = []
+        late = 0
+        for number, index in enumerate(kept):
+            for source, part in ((frames.colors[index], 'rgb'), (frames.depths[index], 'depth')):
+                assert source is not None
+                shutil.copyfile(source, out / part / f'{number + 1:06d}{source.suffix}')
+            if number and index > kept[number - 1] + 1:
+                late = shift_ns
+            elif number and index < kept[number - 1]:
+                late = stamps[-1] + shift_ns - frames.stamps_ns[index]
+            stamps.append(frames.stamps_ns[index] + late)
+        write_truth(out, stamps, [people.get(index, ()) for index in kept])
+        for name in (INTRINSICS, CAMERA_INFO):
+            beside = frames.colors[0].parent.parent / name
+            if beside.is_file():
+                shutil.copyfile(beside, out / name)
 
 
 def _stretches(start: int, count: int, args: argparse.Namespace) -> Iterator[tuple[str, list[int]]]:

@@ -9,7 +9,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,10 +21,8 @@ from rgbd_kcf_tracker.ros.transport import PROFILE_VARIABLE, fitting_profile
 
 
 def environment(with_profile: bool = True) -> dict[str, str]:
-    """For the children: this host only unless the user says otherwise, and the profile."""
+    """For the children: that of this process, and the profile."""
     variables = dict(os.environ)
-    variables.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    variables.setdefault('ROS_LOG_DIR', tempfile.gettempdir())
     path = fitting_profile()
     if with_profile and path is not None:
         variables.setdefault(PROFILE_VARIABLE, str(path))

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import functools
+import math
 import os
 import resource
 import time
@@ -27,6 +28,7 @@ from rgbd_kcf_tracker.batch.cluster import Cluster
 from rgbd_kcf_tracker.batch.loop import run_all
 from rgbd_kcf_tracker.batch.transport import Packed, unpack
 from rgbd_kcf_tracker.batch.workers import LocalPool, Workers, cores
+from rgbd_kcf_tracker.errors import RgbdKcfError
 from rgbd_kcf_tracker.evaluation.contenders import variant
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.jobs import Failure, Job, RunOptions, run_job
@@ -203,7 +205,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--jobs-each', type=int, default=10, metavar='N')
     parser.add_argument('--job', type=float, default=2.0, metavar='S', help='of a waiting job')
     args = parser.parse_args(argv)
-    processes, brought = measure_processes(args.processes, args.scenes, args.duration)
+    if args.jobs_each < 1 or not 0 < args.job < math.inf:
+        parser.error('--jobs-each must be 1 or more, and --job a number above 0')
+    try:
+        processes, brought = measure_processes(args.processes, args.scenes, args.duration)
+    except RgbdKcfError as error:
+        parser.error(str(error))
     print(f'{processes.text()}\na job brings back {brought / 1024:.0f} KiB\n')
     print(measure_coordinator([0, brought], 300).text() + '\n')
     print(measure_cluster(args.workers, args.jobs_each, args.job, brought).text())

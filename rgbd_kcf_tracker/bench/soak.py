@@ -19,6 +19,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from rgbd_kcf_tracker.bench.camera import NAMESPACE, SIZES
+from rgbd_kcf_tracker.bench.domains import kept_to_this_machine
 from rgbd_kcf_tracker.bench.figures import add_output_options, check_output, write_output
 from rgbd_kcf_tracker.bench.latency import first_box
 from rgbd_kcf_tracker.bench.rig import Listener, child, environment, resident_mb
@@ -133,10 +134,10 @@ def main(args: list[str] | None = None) -> int:
     options = parser.parse_args(args)
     try:
         check_output(options)
+        with kept_to_this_machine():
+            soak = run(options.frames, options.size, options.variant)
     except RgbdKcfError as error:
         parser.error(str(error))
-    try:
-        soak = run(options.frames, options.size, options.variant)
     except RuntimeError as error:
         print(f'{parser.prog}: {error}', file=sys.stderr)
         return 2

@@ -16,9 +16,12 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import math
+import os
 import sys
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -27,8 +30,8 @@ from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.bench.altered import (
     add_reading,
     camera_of,
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     read_with_depth,
     write_camera,
@@ -36,9 +39,11 @@ from rgbd_kcf_tracker.bench.altered import (
     write_pair,
     write_truth,
 )
+from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 
 HOLE = 12
 """Pixels across of a hole in depth: about a hand at two metres."""
@@ -55,6 +60,7 @@ class Way:
         spoil: makes a frame's colours, ``(H, W, 3)`` BGR, and depth, ``(H, W)`` metres and 0 where
             nothing is read, into those of the copy; None where the frame is left out.
         draw: makes the first box of somebody, by which a target is given, into that of the copy.
+        whole: whether the amount is a whole number.
     """
 
     says: str
@@ -62,6 +68,7 @@ class Way:
     most: float
     spoil: Callable[[Image, Floats, float, np.random.Generator], tuple[Image, Floats] | None]
     draw: Callable[[Box, float, np.random.Generator], Box] | None = None
+    whole: bool = False
 
     def told(self, amount: float) -> str:
         """What an amount of it does."""
@@ -106,7 +113,7 @@ def _fringe(
     color: Image, depth: Floats, pixels: float, _: np.random.Generator
 ) -> tuple[Image, Floats]:
     far = np.where(depth > 0, depth, np.float32(np.inf))
-    side = math.ceil(pixels)
+    side = int(pixels) + 1  # a window of one pixel leaves all as it is
     near = cv2.erode(far, np.ones((side, side), np.uint8))
     return color, np.where(np.isfinite(near), near, np.float32(0))
 
@@ -142,7 +149,7 @@ WAYS = {
     'lost': Way('{} of the frames after the first are lost', 0.35, 0.99, _lost),
     'holes': Way('depth has holes over {} of the picture, others in each frame', 0.25, 1.0, _holes),
     'dark': Way('what is darker than {} of 255 gives no reading', 25.0, 255.0, _dark),
-    'fringe': Way('what is nearer is {} pixels broader in depth', 9.0, 99.0, _fringe),
+    'fringe': Way('what is nearer is {} pixels broader in depth', 8.0, 98.0, _fringe, whole=True),
     'shift': Way('depth lies {} pixels beside the colours', 6.0, 99.0, _shift),
     'upper': Way("targets' first boxes show the upper {} of them", 0.5, 1.0, _same, _upper),
     'inner': Way("targets' first boxes are {} of their size", 0.5, 9.0, _same, _inner),
@@ -164,6 +171,8 @@ def _way(text: str) -> tuple[Way, float]:
         raise argparse.ArgumentTypeError(
             f'{text!r}: the amount must be above 0, and {way.most:g} at the most'
         )
+    if way.whole and value != round(value):
+        raise argparse.ArgumentTypeError(f'{text!r}: the amount must be a whole number')
     return way, value
 
 
@@ -177,6 +186,53 @@ def _redrawn(
     """Somebody with another box, as far as that lies in the picture."""
     box = draw(person.box, amount, rng).clipped(frame.width, frame.height)
     return person if box is None else dataclasses.replace(person, box=box)
+
+
+def spoil(
+    frames: ImageFrames,
+    people: everyone.People,
+    out: Path,
+    way: Way,
+    amount: float,
+    rng: np.random.Generator,
+) -> int:
+    """Write a spoilt copy of a recording, and return how many pairs it has.
+
+    Args:
+        frames: all of the recording, each with depth.
+        people: who is in them.
+        out: is made.
+        way: how it is spoilt.
+        amount: how much of that.
+        rng: of all that is random.
+
+    Raises:
+        RgbdKcfError: where it is there, cannot be made, or nobody is left in it.
+    """
+    kept: list[int] = []
+    truth: list[list[Annotation]] = []
+    given: set[int] = set()
+    with new_copy(out, 'rgb', 'depth'):
+        for index in range(len(frames)):
+            frame = frames.frame(index)
+            assert frame.depth is not None
+            depth = np.nan_to_num(frame.depth.astype(np.float32), posinf=0.0)
+            spoilt = way.spoil(frame.color, depth, amount, rng)
+            if spoilt is None and kept:
+                continue
+            kept.append(index)
+            write_pair(out, len(kept), *(spoilt or (frame.color, depth)))
+            there = people.get(index, [])
+            if way.draw is not None:
+                there = [
+                    each if each.id in given else _redrawn(each, way.draw, amount, rng, frame)
+                    for each in there
+                ]
+                given.update(each.id for each in there if each.counts)
+            truth.append(there)
+        write_truth(out, [frames.stamps_ns[index] for index in kept], truth)
+        write_camera(out, frames.intrinsics)
+    return len(kept)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -196,33 +252,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     way, amount = args.how
 
     def copies() -> Iterator[str]:
-        for number, (folder, name) in enumerate(zip(args.folders, names, strict=True)):
+        for folder, name in zip(args.folders, names, strict=True):
             frames, people = read_with_depth(folder, args.fps, camera)
-            out, rng = args.out / name, np.random.default_rng([args.seed, number])
-            make_copy(out, 'rgb', 'depth')
-            kept: list[int] = []
-            truth: list[list[Annotation]] = []
-            given: set[int] = set()
-            for index in range(len(frames)):
-                frame = frames.frame(index)
-                assert frame.depth is not None
-                depth = np.nan_to_num(frame.depth.astype(np.float32), posinf=0.0)
-                spoilt = way.spoil(frame.color, depth, amount, rng)
-                if spoilt is None and kept:
-                    continue
-                kept.append(index)
-                write_pair(out, len(kept), *(spoilt or (frame.color, depth)))
-                there = people.get(index, [])
-                if way.draw is not None:
-                    there = [
-                        each if each.id in given else _redrawn(each, way.draw, amount, rng, frame)
-                        for each in there
-                    ]
-                    given.update(each.id for each in there if each.counts)
-                truth.append(there)
-            write_truth(out, [frames.stamps_ns[index] for index in kept], truth)
-            write_camera(out, frames.intrinsics)
-            yield f'{out}: {len(kept)} pairs, {way.told(amount)}'
+            # By its name: whatever else is copied, and in whichever order, its draws are the same.
+            rng = np.random.default_rng([args.seed, zlib.crc32(os.fsencode(name))])
+            out = args.out / name
+            count = spoil(frames, people, out, way, amount, rng)
+            yield f'{out}: {count} pairs, {way.told(amount)}'
 
     return write_copies(args.out, args.folders, copies)
 

@@ -52,6 +52,7 @@ from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.recordings import ReadOptions, Recording, open_recording
 from rgbd_kcf_tracker.recordings.files import read_text
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.simulation.picture import Truth as SimulatedTruth
 
 SURE, HONEST = 0.9, 0.97
@@ -106,11 +107,14 @@ class Where:
         box: about all of it, also what lies outside of the image; None behind the camera.
         shows: whether a tracker is to find it.
         slack: pixels by which the box may be off.
+        hidden: whether something nearer is before its middle: a box there is not judged, as nobody
+            knows what of the thing it is about, if anything.
     """
 
     box: Box | None
     shows: bool
     slack: float = 0.0
+    hidden: bool = False
 
     def holds(self, box: Box) -> bool:
         """Whether another box is on the thing, by its middle."""
@@ -184,11 +188,14 @@ def follow(frames: Iterable[Frame], wheres: Sequence[Where | None], box: Box) ->
         track = tracker.update(frame)
         if where is None:
             continue
+        right = track.box is not None and where.holds(track.box)
+        if right and where.hidden:
+            continue
         tally.frames += 1
         if track.box is None:
             tally.missed += where.shows
             continue
-        right, sure = where.holds(track.box), track.score >= SURE
+        sure = track.score >= SURE
         tally.right += right
         tally.wrong += not right
         tally.sure += sure
@@ -310,7 +317,8 @@ def _where(frame: Frame, point: npt.NDArray[np.float64], box: Box, depth: float)
     if inside is None or inside.area < (1 - WITHIN) ** 2 * whole.area:
         return Where(whole, False, NEAR_M * k.fx / z)
     read = _depth(frame, whole.scaled(2 * MIDDLE))
-    return Where(whole, read is None or read > z - HIDES, NEAR_M * k.fx / z)
+    hidden = read is not None and read <= z - HIDES
+    return Where(whole, not hidden, NEAR_M * k.fx / z, hidden)
 
 
 def _depth(frame: Frame, box: Box) -> float | None:
@@ -376,7 +384,7 @@ class Recorded(Sequence[Frame]):
 
 
 def recorded(
-    frames: Sequence[Frame], folder: str, things: Sequence[Thing], fps: float
+    frames: Sequence[Frame], folder: str, things: Sequence[Thing]
 ) -> list[list[Where | None]]:
     """Where each thing is in a recording's frames.
 
@@ -388,7 +396,10 @@ def recorded(
             raise RecordingError(
                 f'{folder} has {len(frames)} frames, of which {thing.name} begins in {thing.frame}'
             )
-    step = max(1, round(STEP_S * fps))
+    periods = np.diff([frame.stamp_ns for frame in frames])
+    period = float(np.median(periods)) if len(periods) else 0.0
+    # Of stamps that stand still each frame is a step.
+    step = max(1, round(STEP_S * NANOSECONDS / period)) if period > 0 else 1
     estimates = [stands(frames, step), stands(frames, 2 * step)]
     return [places(frames, thing, estimates) for thing in things]
 
@@ -442,9 +453,14 @@ def measured(args: argparse.Namespace) -> tuple[Tracked, list[tuple[Cell, ...]]]
         options = ReadOptions(fps=args.fps, intrinsics=camera)
         with open_recording(args.recording, options) as recording:
             frames = Recorded(recording)
-            wheres = recorded(frames, args.recording, things, args.fps)
+            wheres = recorded(frames, args.recording, things)
             for thing, where in zip(things, wheres, strict=True):
                 count(frames, thing, where, args.recording)
+        if not any(tally.frames for tally in tallies.values()):
+            raise RecordingError(
+                f'{args.recording}: nothing is judged: its tracks have fewer than {LEAST} frames, '
+                "or the camera's motion is not known; give smaller --strides, or poses"
+            )
     for seed in parse_seeds(args.seeds) if args.seeds else []:
         rendered, found = simulated(seed)
         for thing, where in found:
@@ -452,6 +468,8 @@ def measured(args: argparse.Namespace) -> tuple[Tracked, list[tuple[Cell, ...]]]
     all_ = Tracked()
     for tally in tallies.values():
         all_.add(tally)
+    if not all_.frames:
+        raise RecordingError(f'--seeds {args.seeds}: nothing is judged: give smaller --strides')
     rows = [tally.row(f'every {stride}') for stride, tally in tallies.items()]
     return all_, [*rows, all_.row('all')]
 

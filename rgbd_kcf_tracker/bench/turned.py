@@ -22,8 +22,8 @@ from pathlib import Path
 from rgbd_kcf_tracker.bench.altered import (
     add_reading,
     camera_of,
-    make_copy,
     names_of,
+    new_copy,
     parser_of,
     read_with_depth,
     write_camera,
@@ -62,23 +62,23 @@ def turn(
     Raises:
         RgbdKcfError: where it is there, or cannot be made.
     """
-    make_copy(out, 'rgb', 'depth')
-    truth: list[list[Annotation]] = []
-    width = 0
-    for number, index in enumerate(kept, start=1):
-        frame = frames.frame(index)
-        assert frame.depth is not None
-        width = frame.width
-        side = slice(None, None, -1 if mirror else 1)
-        write_pair(out, number, frame.color[:, side], frame.depth[:, side])
-        there = people.get(index, [])
-        truth.append([_mirrored(each, width) for each in there] if mirror else there)
-    first = frames.stamps_ns[kept[0]]
-    write_truth(out, [abs(frames.stamps_ns[index] - first) for index in kept], truth)
-    camera = frames.intrinsics
-    if camera is not None and mirror:
-        camera = dataclasses.replace(camera, cx=width - 1 - camera.cx)
-    write_camera(out, camera)
+    with new_copy(out, 'rgb', 'depth'):
+        truth: list[list[Annotation]] = []
+        width = 0
+        for number, index in enumerate(kept, start=1):
+            frame = frames.frame(index)
+            assert frame.depth is not None
+            width = frame.width
+            side = slice(None, None, -1 if mirror else 1)
+            write_pair(out, number, frame.color[:, side], frame.depth[:, side])
+            there = people.get(index, [])
+            truth.append([_mirrored(each, width) for each in there] if mirror else there)
+        first = frames.stamps_ns[kept[0]]
+        write_truth(out, [abs(frames.stamps_ns[index] - first) for index in kept], truth)
+        camera = frames.intrinsics
+        if camera is not None and mirror:
+            camera = dataclasses.replace(camera, cx=width - 1 - camera.cx)
+        write_camera(out, camera)
 
 
 def _mirrored(one: Annotation, width: int) -> Annotation:

@@ -89,6 +89,12 @@ def run(args: argparse.Namespace) -> int:
 
     sizes = args.sizes or (','.join(SIZES) if args.targets is None else SIZE_OF_SEVERAL)
     settings = [Setting(*_size(text)) for text in sizes.split(',')]
+    for setting in settings:
+        if setting.target_width > setting.width:
+            raise ParameterError(
+                f'size {setting}: the target is {setting.target_width} pixels wide, which do not '
+                'fit into the image: give a smaller one'
+            )
     if args.frames < FEWEST_FRAMES:
         raise ParameterError(f'--frames is {args.frames}: give at least {FEWEST_FRAMES}')
     if args.targets is not None:

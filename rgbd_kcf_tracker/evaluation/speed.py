@@ -44,6 +44,11 @@ class Setting:
     height: int
     target: int
 
+    @property
+    def target_width(self) -> int:
+        """How wide the target is, in pixels."""
+        return max(4, round(self.target * ASPECT))
+
     def __str__(self) -> str:
         return f'{self.width}x{self.height}, target {self.target} px'
 
@@ -59,7 +64,7 @@ class SpeedScene:
         rng = np.random.default_rng(SEED)
         self._setting = setting
         self._wall = _texture(rng, setting.height, setting.width, 24)
-        tall, wide = setting.target, max(4, round(setting.target * ASPECT))
+        tall, wide = setting.target, setting.target_width
         self._figure = _texture(rng, tall, wide, 6)
         outline = np.zeros((tall, wide), np.uint8)
         cv2.ellipse(
