@@ -1647,8 +1647,8 @@ def test_of_whom_depth_shows_an_arm_and_a_leg_where_it_ends_colour_tells_the_res
     """By what showed of him nobody was he, himself among them, and he was lost for good."""
     one = Someone(0.5, 2.5)
     color, depth = images([one])
-    left, hips = round(one.box.x), round((TOP + 0.85) * CAMERA.fy / one.z + CAMERA.cy)
-    depth[:, left + 22 :] = np.nan
+    left, hips = round(one.box.x), round((TOP + 0.95) * CAMERA.fy / one.z + CAMERA.cy)
+    depth[:, left + 19 :] = np.nan
     trunk = depth[:hips, left + 2 :]
     trunk[trunk == one.z] = np.nan
     targets = MetricTargets(MetricParameters())
@@ -1656,9 +1656,14 @@ def test_of_whom_depth_shows_an_arm_and_a_leg_where_it_ends_colour_tells_the_res
     assert targets._followers[number].seen is not None
     person = targets.person(number)
     assert person is not None
-    for shirt, trousers, his in ((RED, BLACK, True), (BLUE, BLACK, False), (RED, GREEN, False)):
-        (sight,) = Watched().see(Someone(0.0, 2.5, shirt, trousers)).sights
-        assert (person.gallery.log_odds(sight.view) > 0) == his
+    for shirt in (RED, BLUE):
+        reader = SceneReader(COLS, 0.04, 0.03, 0.0)
+        for i in range(4):  # then he shows above a desk
+            reader.read(picture([], 0.1 * i, DESK), 0.1)
+        scene = reader.read(picture([Someone(0.0, 2.5, shirt)], 0.4, DESK), 0.1)
+        assert scene is not None
+        (sight,) = Crowd().explain(scene, 0.4).sights
+        assert (person.gallery.log_odds(sight.view) > 0) == (shirt == RED)
 
 
 @pytest.mark.parametrize(('told', 'taken'), [(20, False), (34, True)])

@@ -65,9 +65,9 @@ MENDING, MORE = 2.0, 1.6
 """Seconds in which a target of which a part was hidden when it was chosen becomes the figure that
 it is a part of, and how much larger that is at the least: half as large again may be an arm, or
 somebody who touches it."""
-LEAST_KNOWN = 0.3
+LEAST_KNOWN = 0.2
 """Share of a box that a surface fills, at the least, to be known by it where depth's view ends:
-half a person fills a third, and by legs alone nobody is known again."""
+half a person fills a quarter, and by an arm and a leg nobody is known again."""
 SOON = 0.25
 """Seconds after which nobody is where a box was drawn about him: at a walk (1.4 m/s) he is half a
 body farther."""
@@ -236,14 +236,17 @@ class Follower:
             person.gallery.learn(known, account.time)
 
     def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
-        """Know by the colours of his box of whom depth shows little, where its view ends."""
+        """Know by the colours of his box as well of whom depth shows little, where its view ends."""
         seen, person = self.seen, self.person
         if seen is None or person is None or not account.scene.ends(box).any:
             return
         if np.count_nonzero(seen.mask) > LEAST_KNOWN * box.over(account.scene.view.step).area:
             return
         known = view_in(account.scene, box, look, seen.depth)
-        if known is not None and len(person.gallery.views) == 1:
+        if known is None or len(person.gallery.views) != 1:
+            return
+        person.gallery.learn(known, account.time)
+        if len(person.gallery.views) == 1:  # they say the same, and the box says more
             person.gallery = Gallery()
             person.gallery.learn(known, account.time)
 
