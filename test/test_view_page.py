@@ -277,11 +277,12 @@ def test_everyone_is_shown_followed_renamed_and_let_go(chromium: Browser, crowde
     # Frames on the way to this one are shown too, while everyone is looked for in them.
     page.until('page.shown.everyone && page.shown.frame === 30 && !page.shown.busy')
     page.until("document.querySelectorAll('#others li').length === page.shown.targets.length - 1")
-    # Each has a caption in the colour of its own above its box, and its place in the room.
+    # Each has a caption in the colour of its own above its box, higher where another's is, and its
+    # place in the room.
     apart = page.value('page.shown.targets.find(t => !t.chosen && t.box && t.box[0] > 200)')
     x, y = apart['box'][:2]
     color = page.value(f'rgb(colorOf({apart["id"]})).map(v => 255 * v)')
-    assert any(near(pixel(page, x + 1, y - up), color, 30) for up in range(2, 8))
+    assert any(near(pixel(page, x + 1, y - up), color, 30) for up in range(2, 24))
     other = page.value('page.shown.targets.find(t => !t.chosen && t.box && t.box[1] > 20)')
     assert other['position'] is not None
     assert page.value("document.querySelectorAll('#others .views img').length") > 0

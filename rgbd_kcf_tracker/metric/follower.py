@@ -236,7 +236,7 @@ class Follower:
             person.gallery.learn(known, account.time)
 
     def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
-        """Know by the colours of his box as well of whom depth shows little, where its view ends."""
+        """Know by his box, too, of whom depth shows little where its view ends."""
         seen, person = self.seen, self.person
         if seen is None or person is None or not account.scene.ends(box).any:
             return
