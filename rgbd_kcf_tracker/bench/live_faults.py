@@ -150,18 +150,14 @@ class Target:
         """The end of what it printed."""
         return self._log.read_text(encoding='utf-8', errors='replace')[-500:]
 
-    def _internal_errors(self) -> str:
-        """What the log says of them, which keeps those that diagnostics no longer name."""
-        lines = self._log.read_text(encoding='utf-8', errors='replace').splitlines()
-        return '\n'.join(line[:500] for line in lines if 'internal error' in line)
-
     def _check_log(self) -> None:
         text = self._log.read_text(encoding='utf-8', errors='replace')
         if 'Traceback' in text:
             raise FaultFound(f'it printed a traceback: {text[text.index("Traceback") :][:2000]}')
         # Diagnostics come once a second: what goes wrong just before an end is told here alone.
-        if errors := self._internal_errors():
-            raise FaultFound(errors)
+        errors = [line[:500] for line in text.splitlines() if 'internal error' in line]
+        if errors:
+            raise FaultFound('\n'.join(errors))
 
     def close(self) -> None:
         """End everything."""

@@ -12,10 +12,11 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from rgbd_kcf_tracker.cli.interrupts import interrupts
-from rgbd_kcf_tracker.errors import BoxError, ParameterError
+from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
 if TYPE_CHECKING:
@@ -274,6 +275,20 @@ def tracker_parameters(args: argparse.Namespace, variant: str) -> Parameters:
             raise ParameterError(f'--param {key}: the tracker is {variant}, not {owner!r}')
         given[name] = value
     return with_overrides(default_parameters(variant), given)
+
+
+def require_mcap(path: str, option: str = '') -> None:
+    """Refuse a bag to be written whose name says another format.
+
+    Args:
+        path: of the bag.
+        option: that names it, with a space behind; empty for a plain argument.
+
+    Raises:
+        RecordingError: where it does not end in .mcap.
+    """
+    if Path(path).suffix != '.mcap':
+        raise RecordingError(f'{option}{path} must end in .mcap: that is the format written')
 
 
 def add_overwrite_option(parser: argparse._ActionsContainer, what: str) -> None:

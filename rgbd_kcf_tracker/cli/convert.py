@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.cli.common import (
     read_options,
     refuse,
     refuse_reading,
+    require_mcap,
     warn,
 )
 from rgbd_kcf_tracker.errors import RecordingError
@@ -66,8 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.recordings.sequences import is_sequence_folder
 
     source, dest = Path(args.source), Path(args.dest)
-    if dest.suffix != '.mcap':
-        raise RecordingError(f'{dest} must end in .mcap: that is the format written')
+    require_mcap(args.dest)
     require_source(source)
     check_outputs({'DEST': dest}, [source], args.overwrite)
 

@@ -32,7 +32,6 @@ MOST_SCENES, MOST_DRAWN = 10_000, 1000
 """Scenes that are recorded, or drawn into one picture, at the most. All places are looked at before
 the first scene is rendered, and more than these are a mistake: 10000 scenes as they are by default
 take a terabyte, and a JPEG file holds 65500 rows."""
-_BAGS = ('.mcap', '.bag', '.db3')
 _EPILOG = """\
 examples:
   rgbd-kcf simulate --list
@@ -183,9 +182,10 @@ def _draw_sheet(
 def _destinations(args: argparse.Namespace, jobs: list[tuple[str, int]]) -> list[Path]:
     """Where each scene goes; all are looked at before the first is rendered."""
     from rgbd_kcf_tracker.recordings.outputs import check_outputs, make_folder
+    from rgbd_kcf_tracker.recordings.storage import BAG_SUFFIXES
 
     dest: Path = args.dest
-    if dest.suffix != '.mcap' and dest.suffix.lower() in _BAGS:
+    if dest.suffix != '.mcap' and dest.suffix.lower() in BAG_SUFFIXES:
         raise ParameterError(f'{dest}: bags are written as .mcap: name such a file, or a folder')
     if dest.suffix == '.mcap' or args.format == 'mcap':
         refuse(args, 'for an mcap file', ('color_format',), 'leave it out')

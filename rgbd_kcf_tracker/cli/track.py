@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.cli.common import (
     parse_box,
     progress,
     read_options,
+    require_mcap,
     tracker_parameters,
 )
 from rgbd_kcf_tracker.errors import BoxError, ParameterError, RecordingError
@@ -43,8 +44,8 @@ _SAME_TARGET_IOU = 0.5
 ONLY = 1
 """The id of a target that is followed alone, where one is written."""
 
-_NO_TEXT = ('.mp4', '.m4v', '.mov', '.mkv', '.avi', '.webm', '.mcap', '.bag', '.db3')
-"""How names of videos and bags end: text in such a file is a mistake."""
+_OTHER_VIDEOS = ('.avi', '.webm')
+"""How names of videos end that are not written: text in such a file is a mistake, too."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -345,7 +346,8 @@ def _check_outputs(args: argparse.Namespace) -> None:
     """Refuse outputs that cannot be written, or must not, before anything is done."""
     from rgbd_kcf_tracker.recordings.files import require_source
     from rgbd_kcf_tracker.recordings.outputs import check_outputs
-    from rgbd_kcf_tracker.recordings.video import require_video
+    from rgbd_kcf_tracker.recordings.storage import BAG_SUFFIXES
+    from rgbd_kcf_tracker.recordings.video import SUFFIXES, require_video
 
     require_source(args.source)
     if args.output and args.output.endswith('.parquet'):
@@ -362,13 +364,13 @@ def _check_outputs(args: argparse.Namespace) -> None:
     check_outputs(written, [args.source], args.overwrite)
     for option, form in (('--output', 'CSV'), ('--mot', 'MOT Challenge text')):
         path = written.get(option, '')
-        if path.lower().endswith(_NO_TEXT):
+        if path.lower().endswith((*SUFFIXES, *_OTHER_VIDEOS, *BAG_SUFFIXES)):
             raise ParameterError(
                 f'{option} {path} would be {form}: by its name it is a video or a bag, which '
                 '--video and --bag write'
             )
-    if args.bag and not args.bag.endswith('.mcap'):
-        raise RecordingError(f'--bag {args.bag} must end in .mcap: that is the format written')
+    if args.bag:
+        require_mcap(args.bag, '--bag ')
     if args.video:
         require_video(args.video)
 

@@ -99,8 +99,6 @@ class Drawn:
         seen = view_in(scene, box, look)
         if seen is None:
             return None
-        gallery = Gallery()
-        gallery.learn(seen, time)
         view, b = scene.view, box.over(scene.view.step)
         middle = view.metres(b.cx, b.cy, STATURE * view.intrinsics.fy / b.height)
         # What stands before him is read, and hides a part of him.
@@ -108,7 +106,7 @@ class Drawn:
         alone = np.count_nonzero(about) < TOUCHED * about.size
         whole = bool(alone) and not scene.ends(box).any
         telling = look.unread and b.area >= FEW
-        return cls(gallery, scene.axes @ np.array(middle), whole, telling)
+        return cls(Gallery.of(seen, time), scene.axes @ np.array(middle), whole, telling)
 
     def unlike(self, view: View) -> bool:
         """Whether a figure does not look as he does: said if all of him was drawn, and large."""

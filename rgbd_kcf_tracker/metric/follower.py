@@ -231,9 +231,8 @@ class Follower:
         cut = seen.cut.top or seen.cut.left or seen.cut.right
         hidden = cut and person.gallery.top is None
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
-            person.gallery = Gallery()
             known = View.of(view, account.scene.codes, seen, None, above)
-            person.gallery.learn(known, account.time)
+            person.gallery = Gallery.of(known, account.time)
 
     def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
         """Know by his box, too, of whom depth shows little where its view ends."""
@@ -247,8 +246,7 @@ class Follower:
             return
         person.gallery.learn(known, account.time)
         if len(person.gallery.views) == 1:  # they say the same, and the box says more
-            person.gallery = Gallery()
-            person.gallery.learn(known, account.time)
+            person.gallery = Gallery.of(known, account.time)
 
     def _depth_of_surface(self) -> float | None:
         return float(self._surface.motion.position[2]) if self._surface is not None else None

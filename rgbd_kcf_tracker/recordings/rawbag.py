@@ -20,11 +20,16 @@ from rgbd_kcf_tracker.recordings.files import listing, open_file, read_text
 from rgbd_kcf_tracker.recordings.mcap_storage import McapStorage
 from rgbd_kcf_tracker.recordings.ros1_storage import Ros1Storage
 from rgbd_kcf_tracker.recordings.sqlite_storage import SqliteStorage
-from rgbd_kcf_tracker.recordings.storage import Definition, Storage, Topic, header_stamp
+from rgbd_kcf_tracker.recordings.storage import (
+    BAG_SUFFIXES,
+    Definition,
+    Storage,
+    Topic,
+    header_stamp,
+)
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
 _PARTS = 'relative_file_paths'
-_SUFFIXES = ('.mcap', '.db3', '.bag')
 _STORAGES: dict[bytes, Callable[[Path], Storage]] = {
     b'\x89MCAP': McapStorage,
     b'#ROSBAG': Ros1Storage,
@@ -170,7 +175,7 @@ class RawBag:
             if mode == 'message':
                 self._message_method = str(metadata.get('compression_format') or 'zstd')
         inside = sorted(listing(self.path), key=lambda p: natural_key(p.name))
-        present = {p.name: p for p in inside if p.name.removesuffix('.zstd').endswith(_SUFFIXES)}
+        present = {p.name: p for p in inside if p.name.removesuffix('.zstd').endswith(BAG_SUFFIXES)}
         missing = [name for name in names if name not in present]
         if missing:
             shown = ', '.join(missing[:5]) + (' ...' if len(missing) > 5 else '')

@@ -21,6 +21,8 @@ Where = tuple[int, int, int]
 
 NANOSECONDS = 1_000_000_000
 """Of a second."""
+BAG_SUFFIXES = ('.mcap', '.db3', '.bag')
+"""How the names of bags end."""
 HEAD = 12
 """Bytes of a message that the scan looks at: enough for the stamp of its header."""
 CACHED_CHUNKS = 4

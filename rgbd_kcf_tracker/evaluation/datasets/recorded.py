@@ -14,8 +14,8 @@ from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sample, Sequence, entries, group
 from rgbd_kcf_tracker.recordings import open_recording
 from rgbd_kcf_tracker.recordings.recording import ReadOptions
+from rgbd_kcf_tracker.recordings.storage import BAG_SUFFIXES
 
-SUFFIXES = ('.mcap', '.bag', '.db3')
 RECORDING = 'recording'
 """Kind of a sequence that is a bag."""
 
@@ -23,7 +23,7 @@ RECORDING = 'recording'
 def is_sequence(path: Path) -> bool:
     """Whether a path is a bag: a file that is named as one, or a rosbag2 folder."""
     if path.is_file():
-        return path.suffix in SUFFIXES
+        return path.suffix in BAG_SUFFIXES
     return (path / 'metadata.yaml').is_file() or (path.is_dir() and _is_split(path))
 
 
@@ -44,7 +44,7 @@ def _is_split(folder: Path) -> bool:
     Others are a recording each, as a data set has them.
     """
     names = [path.name.removesuffix('.zstd') for path in entries(folder)]
-    bags = [name for name in names if name.endswith(SUFFIXES)]
+    bags = [name for name in names if name.endswith(BAG_SUFFIXES)]
     part = re.compile(rf'{re.escape(folder.name)}_[0-9]+\.(mcap|db3)')
     kinds = {found[1] if (found := part.fullmatch(name)) else None for name in bags}
     return len(kinds) == 1 and None not in kinds

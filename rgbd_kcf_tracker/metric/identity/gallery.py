@@ -359,6 +359,13 @@ class Gallery:
         look = look_log_odds(alike, min(view.total, self._largest), views, view.grey)
         return odds + (max(look, 0.0) if self.mixed else look)
 
+    @classmethod
+    def of(cls, view: View, time: float) -> Gallery:
+        """One that knows a view, seen at ``time`` in seconds."""
+        gallery = cls()
+        gallery.learn(view, time)
+        return gallery
+
     def learn_height(self, top: float, time: float) -> None:
         """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""
         self._set_tops([*self._tops, (time, top)])
