@@ -86,6 +86,17 @@ def test_commands_and_their_options_are_there(page: Path) -> None:
                 assert option in options(command), f'{page.name}: {line.strip()}'
 
 
+@pytest.mark.parametrize('page', PAGES, ids=lambda p: p.name)
+def test_rows_belong_to_a_table(page: Path) -> None:
+    """A row without a heading above it, or with other columns, is text with bars in it."""
+    text = re.sub(r'^```.*?^```', '', page.read_text(encoding='utf-8'), flags=re.M | re.S)
+    for table in re.findall(r'(?:^\|.*\n?)+', text, flags=re.M):
+        heading, ruler, *rows = table.splitlines()
+        assert re.fullmatch(r'(?:\| ?:?-+:? ?)+\|', ruler), heading
+        columns = {len(re.findall(r'(?<!\\)\|', row)) for row in (heading, ruler, *rows)}
+        assert len(columns) == 1, f'{page.name}: {heading}'
+
+
 def test_what_is_used_from_python_is_exported() -> None:
     text = (ROOT / 'docs' / 'recordings.md').read_text(encoding='utf-8')
     told = re.search(r'^From Python: (.*?)\n\n', text, re.M | re.S)
