@@ -290,6 +290,22 @@ def test_what_somebody_has_left_whom_it_was_one_figure_with_is_nobody_as_it_does
     assert wrong[35:] == [0] * 6
 
 
+def test_of_two_who_change_places_between_two_frames_none_is_the_target_for_sure():
+    """Two in green, of whom one view is known, at a frame a second: either may be she."""
+    scene = simulate('reunion', seed=1047, rate_hz=1.0, size=(640, 480))
+    first, *rest = islice(scene, 19, 27)
+    tracker, sure = create_tracker('metric'), []
+    chosen = first.truths[2].visible
+    assert chosen is not None
+    tracker.start(first.frame, chosen)
+    for sample in rest:
+        track, she = tracker.update(sample.frame), sample.truths[2].visible
+        if track.box is not None and she is not None and track.box.iou(she) < 0.1:
+            sure.append(track.score)
+    assert sure  # she is taken for another
+    assert max(sure) < 0.9
+
+
 @pytest.mark.slow
 def test_position_is_where_the_target_is():
     errors = []

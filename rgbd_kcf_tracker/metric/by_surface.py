@@ -108,6 +108,7 @@ class BySurface:
         hidden_for: seconds since the target was last seen.
         was_away: whether it was absent for so long, before the last frame, that its place says
             little.
+        contested: how likely the target is another candidate of the last frame than the best.
     """
 
     def __init__(
@@ -143,6 +144,7 @@ class BySurface:
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
         self._misses, self.was_away = 0, False
+        self.contested = 0.0
         self.candidates: list[Candidate] = []
         self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
         self._learn_around(scene, first, None)
@@ -159,6 +161,7 @@ class BySurface:
         """
         scene = account.scene
         self.was_away = absent(self.hidden_for + dt, self._misses)
+        self.contested = 0.0
         self._dt = dt
         if self._person.figure:
             self._stood.moves()
@@ -227,6 +230,7 @@ class BySurface:
             return best
         mine = best.probability / (1 - best.probability)
         theirs = sum(each.probability / (1 - each.probability) for each in rivals)
+        self.contested = theirs / (1 + mine + theirs)
         return dataclasses.replace(best, probability=mine / (1 + mine + theirs))
 
     def belief(self) -> Belief | None:

@@ -74,6 +74,10 @@ body farther."""
 TALL, TALLER = 0.9, 1.2
 """Metres of height of an upright part of somebody, half of him seen past a corner, and of somebody:
 no chair's back reaches as high as the latter."""
+LONG_STEP, CONTESTED = 0.5, 0.05
+"""Seconds between two frames in which two people can change places, half a metre each, and how
+likely the target is then another than the one it is taken for, from which that is asked on: what is
+nearly sure in one frame is not in twenty."""
 NEW_SCORE = 0.8
 """Score of a box when the target has just been found to be a newcomer: place and colours fit, but
 nothing has borne it out yet."""
@@ -367,11 +371,15 @@ class Follower:
         """Whether the target was not seen for a while, and somebody else may be taken for it now.
 
         He is held against what was known of it before, if that is more than a part: most of one of
-        whom only a part is known looks otherwise.
+        whom only a part is known looks otherwise. Where two may have changed places between two
+        frames of a slow camera, though, either is held against whatever is known.
         """
-        unseen = surface.hidden_for > 0 or dt > REUNION
         person = self.person
-        return unseen and person is not None and person.figure and person.gallery.whole
+        if person is None or not person.figure:
+            return False
+        if dt > LONG_STEP and surface.contested > CONTESTED:
+            return bool(person.gallery.views)
+        return (surface.hidden_for > 0 or dt > REUNION) and person.gallery.whole
 
     def _likely(self, comeback: Comeback, account: Account, found: Candidate | None) -> Likely:
         """Whether a returned target is the target, by what was known before it left."""
