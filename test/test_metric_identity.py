@@ -1631,6 +1631,22 @@ def test_a_box_half_beside_somebody_means_him_where_nothing_else_is_there(read: 
     assert seen is None or box_about(scene, seen).iou(b) > 0.9
 
 
+@pytest.mark.parametrize('other', ['nobody', 'behind', 'aside'])
+def test_a_box_that_holds_a_side_of_somebody_means_him_or_who_is_half_hidden_behind_him(other: str):
+    one = Someone(0.0, 2.5)
+    b = one.box
+    drawn = b.moved(-0.6 * b.width, 0)
+    people = {'nobody': [], 'behind': [Someone(-0.3, 3.5)], 'aside': [Someone(-0.52, 2.0)]}
+    color, depth = images([one, *people[other]])
+    if other == 'behind':  # only the middle of him
+        depth[: round(b.cy) - 20] = np.where(
+            depth[: round(b.cy) - 20] == 3.5, WALL, depth[: round(b.cy) - 20]
+        )
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), drawn, MetricParameters())
+    assert (seen is not None and box_about(scene, seen).iou(b) > 0.9) == (other != 'behind')
+
+
 def test_who_shows_at_the_end_of_depth_is_not_meant_by_a_box_that_lies_mostly_beyond_it():
     """In the columns that depth reaches nobody else was there."""
     one = Someone(0.0, 2.5)

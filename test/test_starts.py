@@ -23,9 +23,16 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize('points', [None, np.random.default_rng(1)])
-def test_everybody_in_every_nth_frame_is_started_on(recording: Path, points):
-    found = list(starts.starts(recording, 4, points))
+@pytest.mark.parametrize(
+    ('way', 'least'),
+    [
+        (starts.as_given, 0.8),
+        (starts.badly(0.2, np.random.default_rng(1)), 0.7),
+        (starts.clicked(np.random.default_rng(1)), 0.6),  # beside his outline he is no person
+    ],
+)
+def test_everybody_in_every_nth_frame_is_started_on(recording: Path, way: starts.Way, least: float):
+    found = list(starts.starts(recording, 4, way))
     assert len(found) > 10
     for start in found:
         assert 0 < start.share <= 1
@@ -35,8 +42,7 @@ def test_everybody_in_every_nth_frame_is_started_on(recording: Path, points):
         for s in found
         if s.share > 0.9
     ]
-    # Who is clicked on beside his outline is no person's there.
-    assert sum(right) > (0.8 if points is None else 0.6) * len(right) > 0
+    assert sum(right) > least * len(right) > 0
 
 
 def test_starts_are_counted_by_what_they_are_on():
@@ -67,8 +73,15 @@ def test_a_folder_that_does_not_say_who_is_how_far_off_is_refused_by_name(
 def test_the_command_prints_a_row_for_each_share(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ):
-    for points in ([], ['--points']):
-        assert starts.main([str(recording), '--every', '12', *points]) == 0
+    for way in ([], ['--points'], ['--off', '0.2']):
+        assert starts.main([str(recording), '--every', '12', *way]) == 0
         said = capsys.readouterr().out
         assert '0.9 to 1.0' in said
         assert 'all' in said
+
+
+@pytest.mark.parametrize('wrong', [['--off', '2'], ['--off', '-0.1'], ['--off', '0.1', '--points']])
+def test_boxes_that_are_off_by_more_than_their_size_are_refused(wrong: list[str]):
+    with pytest.raises(SystemExit) as error:
+        starts.main(['folder', *wrong])
+    assert error.value.code == 2

@@ -137,7 +137,8 @@ def _inner(box: Box, share: float, _: np.random.Generator) -> Box:
     return box.scaled(share)
 
 
-def _drawn(box: Box, share: float, rng: np.random.Generator) -> Box:
+def drawn_badly(box: Box, share: float, rng: np.random.Generator) -> Box:
+    """A box whose middle and size deviate by a share of its size."""
     right, down, broader, taller = (share * rng.standard_normal(4)).tolist()
     cx, cy = box.cx + right * box.width, box.cy + down * box.height
     return Box.from_center(cx, cy, box.width * math.exp(broader), box.height * math.exp(taller))
@@ -153,7 +154,7 @@ WAYS = {
     'shift': Way('depth lies {} pixels beside the colours', 6.0, 99.0, _shift),
     'upper': Way("targets' first boxes show the upper {} of them", 0.5, 1.0, _same, _upper),
     'inner': Way("targets' first boxes are {} of their size", 0.5, 9.0, _same, _inner),
-    'drawn': Way("targets' first boxes are off by {} of their size", 0.1, 1.0, _same, _drawn),
+    'drawn': Way("targets' first boxes are off by {} of their size", 0.1, 1.0, _same, drawn_badly),
 }
 
 

@@ -8,7 +8,8 @@
 draws the box of what shows of everybody into every twelfth frame of simulated recordings, each time
 as the first that the tracker sees, and holds the depth of what it takes for the target against that
 of the person. Where depth tells nothing the look is followed: that is no error yet. With
-``--points`` a point somewhere about the middle of that box is clicked on instead.
+``--points`` a point somewhere about the middle of that box is clicked on instead; with ``--off``
+the box is drawn as badly as ``bench.spoilt --how drawn`` draws it.
 """
 
 from __future__ import annotations
@@ -16,12 +17,13 @@ from __future__ import annotations
 import argparse
 import itertools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from rgbd_kcf_tracker.bench.spoilt import drawn_badly
 from rgbd_kcf_tracker.errors import BoxError, DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import everyone
 from rgbd_kcf_tracker.evaluation.datasets.folder import read_fractions
@@ -61,13 +63,41 @@ class Start(NamedTuple):
     taken: float | None
 
 
-def starts(folder: Path, every: int, points: np.random.Generator | None) -> Iterator[Start]:
+Way = Callable[[Frame, Box], Box | None]
+"""How somebody whose box is given is pointed out to the tracker: the box that it gets, or None
+where that is refused."""
+
+
+def as_given(_: Frame, box: Box) -> Box:
+    """The box itself."""
+    return box
+
+
+def clicked(rng: np.random.Generator) -> Way:
+    """A click somewhere about the middle, by :data:`OFF`."""
+
+    def way(frame: Frame, box: Box) -> Box | None:
+        right, down = (OFF * rng.standard_normal(2)).tolist()
+        try:
+            return target_at(frame, box.cx + right * box.width, box.cy + down * box.height)
+        except BoxError:
+            return None
+
+    return way
+
+
+def badly(share: float, rng: np.random.Generator) -> Way:
+    """A box that is off by a share of its size."""
+    return lambda frame, box: drawn_badly(box, share, rng).clipped(frame.width, frame.height)
+
+
+def starts(folder: Path, every: int, way: Way = as_given) -> Iterator[Start]:
     """All starts in a recording.
 
     Args:
         folder: the recording.
         every: frames from one start to the next.
-        points: draws what is clicked on; None where boxes are drawn.
+        way: how people are pointed out.
 
     Raises:
         RgbdKcfError: where it cannot be read, or does not say how far off anybody is.
@@ -89,18 +119,14 @@ def starts(folder: Path, every: int, points: np.random.Generator | None) -> Iter
         for at in np.flatnonzero((truth.frames == number) & (truth.scores > 0)).tolist():
             share = shares[int(truth.ids[at])][number]
             distance = float(truth.positions[at, 2])
-            yield Start(share, distance, _taken(frame, truth.box(at), points))
+            yield Start(share, distance, _taken(frame, way(frame, truth.box(at))))
 
 
-def _taken(frame: Frame, box: Box, points: np.random.Generator | None) -> float | None:
+def _taken(frame: Frame, box: Box | None) -> float | None:
     """Metres to what is taken for the target; NaN where depth tells nothing, None for nothing."""
+    if box is None:
+        return None
     targets = MetricTargets(MetricParameters())
-    if points is not None:
-        right, down = (OFF * points.standard_normal(2)).tolist()
-        try:
-            box = target_at(frame, box.cx + right * box.width, box.cy + down * box.height)
-        except BoxError:
-            return None
     depth = targets.started(targets.add(frame, box)).depth
     return np.nan if depth is None else depth
 
@@ -130,13 +156,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         'folders', nargs='+', type=Path, metavar='FOLDER', help='simulated, of several people'
     )
     parser.add_argument('--every', type=int, default=12, help='frames from one start to the next')
-    parser.add_argument('--points', action='store_true', help='click on them instead')
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument('--points', action='store_true', help='click on them instead')
+    how.add_argument(
+        '--off', type=float, metavar='SHARE', help='boxes are off by that of their size'
+    )
     args = parser.parse_args(argv)
-    points = np.random.default_rng(1) if args.points else None
     if args.every < 1:
         parser.error('--every must be 1 or more')
+    if args.off is not None and not 0 < args.off <= 1:
+        parser.error('--off must be above 0 and at most 1')
+    rng = np.random.default_rng(1)
+    way = as_given if args.off is None else badly(args.off, rng)
+    if args.points:
+        way = clicked(rng)
     try:
-        found = [start for folder in args.folders for start in starts(folder, args.every, points)]
+        found = [start for folder in args.folders for start in starts(folder, args.every, way)]
     except RgbdKcfError as error:
         print(error, file=sys.stderr)
         return 2

@@ -51,8 +51,8 @@ LEAST_BESIDE = 0.25
 """How much of who is half hidden a box shows at the least, against the largest that it shows of
 anything no larger than a person: of less there is more between somebody's arms and legs."""
 SOMEBODY_FARTHER = 0.1
-"""Share of the given box that shows somebody farther than what fills most of it, from which that
-may hide whom the box is about: less is seen between somebody's arms and legs."""
+"""Share of the given box that shows somebody farther than what fills most of it, or of its middle,
+from which that may hide whom the box is about: less is seen between somebody's arms and legs."""
 LEAST_TOLD = 0.5
 """Share of the given box's columns that depth reaches from which these tell what it is about: most
 of it. In a third of one about somebody who came in, a strip of who stood behind him showed."""
@@ -72,10 +72,9 @@ are drawn in recordings none that finds nothing overlaps anybody by so much."""
 HEAD = 0.075
 """Square metres of a box about somebody's head, with hair and whatever little it is too large, at
 the most: faces have up to 0.045. Of so little a face may be meant, or what is held in a hand."""
-LEAST_MEANT, MOST_ELSE = 0.25, 0.6
-"""Share of the middle of such a box that he fills at least, where it shows nothing else but what is
-behind him; and how much else, against that, it may show: of those who were meant mostly up to 0.55,
-where somebody nearer was meant 0.9 and more."""
+LEAST_MEANT, AS_WELL = 0.1, 0.5
+"""Share of the middle of such a box that he fills at least, where nothing else in it may be meant
+as much; and how well it must fit another's outline for that, against his: a better half is his."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it on each side: boxes are drawn no
 better by hand, and outlines in depth lie beside those in colour. What is farther out is somebody
@@ -383,14 +382,22 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
 
 
 def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
-    """Whether the middle of a box shows a silhouette, and nothing else but what is behind it."""
+    """Whether the middle of a box shows mostly a silhouette, or nobody else who may be meant.
+
+    That is who is half hidden behind him, or who stands before him as much in the box as he does;
+    and of whom there is no reading. A wall behind him is not, nor is who comes in from the side.
+    """
     middle = part_in(scene.view.shape, box.scaled(0.5).over(scene.view.step))
     own = seen.in_view(scene.view.shape)[middle]
-    depth = scene.view.depth[middle]
-    large = larger_than_anybody(scene.sizes)[scene.surfaces.labels[middle]]
-    behind = large & (depth > seen.depth + DEPTH_STEP) | ~scene.standing[middle] & (depth > 0)
-    shows, rest = np.count_nonzero(own), np.count_nonzero(~own & ~behind)
-    alone = shows > LEAST_MEANT * own.size and rest < MOST_ELSE * shows
+    depth, labels = scene.view.depth[middle], scene.surfaces.labels[middle]
+    beyond = depth > seen.depth + DEPTH_STEP
+    room = larger_than_anybody(scene.sizes)[labels] & beyond | ~scene.standing[middle] & (depth > 0)
+    aside = _overlaps_of(scene, box) < AS_WELL * box_about(scene, seen).iou(box)
+    aside[0] = False
+    farther = ~own & ~room & beyond
+    other = ~own & ~room & ~beyond & ~aside[labels]
+    shows, hides = np.count_nonzero(own), np.count_nonzero(farther) >= SOMEBODY_FARTHER * own.size
+    alone = shows > LEAST_MEANT * own.size and shows > np.count_nonzero(other) and not hides
     return bool(alone or shows > MOSTLY * own.size)
 
 
