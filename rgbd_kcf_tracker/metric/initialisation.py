@@ -72,9 +72,10 @@ are drawn in recordings none that finds nothing overlaps anybody by so much."""
 HEAD = 0.075
 """Square metres of a box about somebody's head, with hair and whatever little it is too large, at
 the most: faces have up to 0.045. Of so little a face may be meant, or what is held in a hand."""
-LEAST_MEANT, AS_WELL = 0.1, 0.5
-"""Share of the middle of such a box that he fills at least, where nothing else in it may be meant
-as much; and how well it must fit another's outline for that, against his: a better half is his."""
+LEAST_MEANT, MOST_ELSE, AS_WELL = 0.1, 0.5, 0.5
+"""Share of the middle of such a box that he fills at least, where it shows nobody else who may be
+meant; how much of such others it may show, against that; and how well it must fit another's outline
+for that, against his: who fits less than half as well is not meant."""
 OUTSIDE = 0.1
 """Share of the given box by which a silhouette may stick out of it on each side: boxes are drawn no
 better by hand, and outlines in depth lie beside those in colour. What is farther out is somebody
@@ -397,8 +398,8 @@ def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
     farther = ~own & ~room & beyond
     other = ~own & ~room & ~beyond & ~aside[labels]
     shows, hides = np.count_nonzero(own), np.count_nonzero(farther) >= SOMEBODY_FARTHER * own.size
-    alone = shows > LEAST_MEANT * own.size and shows > np.count_nonzero(other) and not hides
-    return bool(alone or shows > MOSTLY * own.size)
+    alone = shows > LEAST_MEANT * own.size and np.count_nonzero(other) < MOST_ELSE * shows
+    return bool((alone and not hides) or shows > MOSTLY * own.size)
 
 
 def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
