@@ -237,6 +237,8 @@ def test_a_view_without_common_parts_says_nothing():
     empty = View(np.zeros_like(view.roots), np.zeros_like(view.area), view.color, None)
     assert alike(view, empty) == 0.0
     assert view.roots.shape[0] == SLICES
+    assert Gallery.of(view, 0.0).log_odds(empty) == 0.0
+    assert Gallery.of(empty, 0.0).log_odds(view) == 0.0
 
 
 def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():

@@ -229,6 +229,8 @@ class Compared:
     def of_each(self, starts: Sequence[int]) -> Floats:
         """How alike the view is to each of several people, ``(p,)``, 0 to 1: to his best view.
 
+        NaN where no slice of his shows in both, so that nothing is known.
+
         What one view of somebody does not show is as in whichever other one of his fits best, in
         the same light: who showed above a desk has not the trousers of anybody.
 
@@ -242,6 +244,7 @@ class Compared:
         weight = np.where(shows, self.weight, most[whose])
         alike = np.where(shows[..., None], self.alike, best[whose])
         found: Floats = np.maximum.reduceat(_best(weight, alike), starts)
+        found[~most.any(axis=1)] = np.nan
         return found
 
 
@@ -354,7 +357,7 @@ class Gallery:
 
     def _log_odds(self, view: View, alike: float | None, views: int) -> float:
         odds = height_log_odds(view.top, self.top)
-        if alike is None:
+        if alike is None or math.isnan(alike):
             return odds
         look = look_log_odds(alike, min(view.total, self._largest), views, view.grey)
         return odds + (max(look, 0.0) if self.mixed else look)
