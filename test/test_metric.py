@@ -306,6 +306,19 @@ def test_of_two_who_change_places_between_two_frames_none_is_the_target_for_sure
     assert max(sure) < 0.9
 
 
+def test_a_thing_that_becomes_one_surface_with_the_hand_that_holds_it_is_still_there():
+    """It was hidden while it was in full view: depth shows no thing of its size any more."""
+    tracker, seen = create_tracker('metric'), []
+    for i, sample in enumerate(islice(simulate('carried_mug', seed=201, rate_hz=10.0), 11)):
+        assert sample.visible is not None
+        if i == 0:
+            tracker.start(sample.frame, sample.visible)
+            continue
+        track = tracker.update(sample.frame)
+        seen.append(track.box is not None and track.box.iou(sample.visible) > 0.5)
+    assert all(seen)
+
+
 @pytest.mark.slow
 def test_position_is_where_the_target_is():
     errors = []

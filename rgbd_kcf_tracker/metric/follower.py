@@ -38,6 +38,7 @@ from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import depth_step
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH
 from rgbd_kcf_tracker.track import Track, TrackState
@@ -51,6 +52,9 @@ only where depth fails, and learning it takes time."""
 BLIND = 0.25
 """Share of the expected body without a reading from which depth says nothing of it: what is covered
 has the readings of what covers it, and only sun, glass and distance leave this much without."""
+HELD = 0.5
+"""Share of a small thing's place that is as deep as it from which it is still there, as a part of
+whatever is: most of it, and what hides it is nearer."""
 PART_SEEN = 0.8
 """Score of who is told by what moves where he was and looks unlike himself: of such boxes four of
 five are right on simulated scenes, and most of the others are on the little that shows of him."""
@@ -475,6 +479,7 @@ class Follower:
         if self._look is not None and view is not None:
             box = surface.expected_body.box(view)
             blind = scene is None or surface.expected_body.unread(scene) > BLIND
+            blind = blind or self._held(scene, surface)
             # Who was away need not be where he was expected: what is like him may be anything.
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
@@ -497,6 +502,14 @@ class Follower:
                     return self._tracked(frame, look.box, _score(look, stood), look.depth, belief)
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
+
+    def _held(self, scene: Scene | None, surface: BySurface) -> bool:
+        """Whether a small thing is one surface with what is where it is: the hand that holds it."""
+        if scene is None or self.person is None or self.person.area > SMALL:
+            return False
+        z = float(surface.motion.position[2])
+        step = self._parameters.jump + self._parameters.jump_per_metre * z
+        return surface.expected_body.as_deep(scene, step) > HELD
 
     def _stood_there(self, account: Account | None, box: Box) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""
