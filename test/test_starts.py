@@ -31,7 +31,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (starts.clicked(np.random.default_rng(1)), 0.6),  # beside his outline he is no person
     ],
 )
-def test_everybody_in_every_nth_frame_is_started_on(recording: Path, way: starts.Way, least: float):
+def test_everybody_in_every_nth_frame_is_started_on(
+    recording: Path, way: starts.Pointing, least: float
+):
     found = list(starts.starts(recording, 4, way))
     assert len(found) > 10
     for start in found:

@@ -63,7 +63,7 @@ class Start(NamedTuple):
     taken: float | None
 
 
-Way = Callable[[Frame, Box], Box | None]
+Pointing = Callable[[Frame, Box], Box | None]
 """How somebody whose box is given is pointed out to the tracker: the box that it gets, or None
 where that is refused."""
 
@@ -73,7 +73,7 @@ def as_given(_: Frame, box: Box) -> Box:
     return box
 
 
-def clicked(rng: np.random.Generator) -> Way:
+def clicked(rng: np.random.Generator) -> Pointing:
     """A click somewhere about the middle, by :data:`OFF`."""
 
     def way(frame: Frame, box: Box) -> Box | None:
@@ -86,12 +86,12 @@ def clicked(rng: np.random.Generator) -> Way:
     return way
 
 
-def badly(share: float, rng: np.random.Generator) -> Way:
+def badly(share: float, rng: np.random.Generator) -> Pointing:
     """A box that is off by a share of its size."""
     return lambda frame, box: drawn_badly(box, share, rng).clipped(frame.width, frame.height)
 
 
-def starts(folder: Path, every: int, way: Way = as_given) -> Iterator[Start]:
+def starts(folder: Path, every: int, way: Pointing = as_given) -> Iterator[Start]:
     """All starts in a recording.
 
     Args:
@@ -167,9 +167,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.off is not None and not 0 < args.off <= 1:
         parser.error('--off must be above 0 and at most 1')
     rng = np.random.default_rng(1)
-    way = as_given if args.off is None else badly(args.off, rng)
-    if args.points:
-        way = clicked(rng)
+    way = clicked(rng) if args.points else as_given
+    if args.off is not None:
+        way = badly(args.off, rng)
     try:
         found = [start for folder in args.folders for start in starts(folder, args.every, way)]
     except RgbdKcfError as error:

@@ -52,7 +52,7 @@ only where depth fails, and learning it takes time."""
 BLIND = 0.25
 """Share of the expected body without a reading from which depth says nothing of it: what is covered
 has the readings of what covers it, and only sun, glass and distance leave this much without."""
-HELD = 0.5
+AS_DEEP = 0.5
 """Share of a small thing's place that is as deep as it from which it is still there, as a part of
 whatever is: most of it, and what hides it is nearer."""
 PART_SEEN = 0.8
@@ -507,9 +507,7 @@ class Follower:
         """Whether a small thing is one surface with what is where it is: the hand that holds it."""
         if scene is None or self.person is None or self.person.area > SMALL:
             return False
-        z = float(surface.motion.position[2])
-        step = self._parameters.jump + self._parameters.jump_per_metre * z
-        return surface.expected_body.as_deep(scene, step) > HELD
+        return surface.expected_body.as_deep(scene) > AS_DEEP
 
     def _stood_there(self, account: Account | None, box: Box) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""

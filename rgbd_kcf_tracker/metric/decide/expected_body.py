@@ -64,10 +64,12 @@ class ExpectedBody:
             return 0.0
         return 1.0 - np.count_nonzero(depth) / depth.size
 
-    def as_deep(self, scene: Scene, step: float) -> float:
-        """Share of it where something is as far off, to within ``step`` metres in depth."""
+    def as_deep(self, scene: Scene) -> float:
+        """Share of it where something is as far off, by less than the step between two surfaces."""
         depth, total = self._inside(scene)
-        return np.count_nonzero(np.abs(depth - self.position[2]) < step) / total
+        z = float(self.position[2])
+        step = scene.surfaces.jump + scene.surfaces.jump_per_metre * z
+        return np.count_nonzero(np.abs(depth - z) < step) / total
 
     def box(self, view: DepthView) -> Box | None:
         """The box about it in pixels of the image; None where it is too near to have one."""
