@@ -78,6 +78,22 @@ def test_what_is_put_off_until_the_answer_is_out_changes_no_answer(scene):
     assert answers[0] == answers[1] == answers[2]
 
 
+def test_what_was_put_off_is_done_before_somebody_is_added_in_a_new_frame(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """The question whether the camera had crept was dropped."""
+    targets = TargetSet('metric')
+    assert targets.metric is not None
+    targets.everyone = targets.metric.puts_off = True
+    for i in range(3):
+        targets.update(both(i))
+    reader, settled = targets.metric._reader, []
+    last = reader.last_view
+    monkeypatch.setattr(reader, 'settle', lambda: settled.append(reader.last_view))
+    targets.add(both(3), left(3).box)
+    assert settled[0] is last
+
+
 @pytest.mark.parametrize(('rate', 'turns'), [(30, 1), (10, 3), (5, 4)])
 def test_targets_followed_by_their_look_take_turns_at_learning_and_at_being_searched_for(
     rate: int, turns: int, monkeypatch: pytest.MonkeyPatch

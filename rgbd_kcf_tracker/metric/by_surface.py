@@ -104,6 +104,7 @@ class BySurface:
         stood: where the target stands, where it was followed before; None where that is not known.
 
     Attributes:
+        person: the target.
         candidates: of the last frame, for looking at what the tracker saw.
         hidden_for: seconds since the target was last seen.
         was_away: whether it was absent for so long, before the last frame, that its place says
@@ -121,18 +122,13 @@ class BySurface:
         stood: Stood | None = None,
     ) -> None:
         self._parameters, self._cues = parameters, cues
-        self._person = person
+        self.person = person
         scene = account.scene
         self.body = Body(first)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
         placed = self.body.place(first, scene.codes, scene.view, here, None)
-        self.motion = MotionFilter(
-            placed.position,
-            FIRST_SIGMA,
-            parameters.speed,
-            np.full(3, parameters.acceleration),
-        )
+        self.motion = self._motion_from(placed)
         self._middle = MiddleFilter()
         self._middle.seen(scene.view, first, placed, self.body)
         if stood is None:
@@ -163,38 +159,29 @@ class BySurface:
         self.was_away = absent(self.hidden_for + dt, self._misses)
         self.contested = 0.0
         self._dt = dt
-        if self._person.figure:
+        if self.person.figure:
             self._stood.moves()
         self._stood.carried(scene.way, dt)
-        if isinstance(scene.motion, Pose):
-            self.motion.carried(scene.motion)
-            if self._cloud is not None:
-                self._cloud.carried(scene.motion)
         self._predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
         if self._cloud is not None:
             self._cloud.weigh(dt, scene.view, PLACED_MIDDLE * self.body.height)
         expected = self.expected(dt)
         missing = self.expected_body.visible(scene) > 0.6
-        others = account.others(self._person)
+        others = account.others(self.person)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
         # Where his own figure is known, what holds somebody else besides is no proposal.
-        most = STANDING if self._person not in account.owners else MIXED
+        most = STANDING if self.person not in account.owners else MIXED
         free = [seen for seen in found if others.share(seen) < most]
-        figures = [
+        free += [
             sight.figure.seen
             for kind, sight in enumerate(account.sights, FIRST)
             if not others.theirs[kind]
+            and sight.figure.seen.area < MOST_SHARE * self.body.area
+            and not any(sight.figure.seen.same(other) for other in free)
         ]
-        free += [
-            seen
-            for seen in figures
-            if seen.area < MOST_SHARE * self.body.area
-            and not any(seen.same(other) for other in free)
-        ]
-        self.candidates = self._weighed(account, frame, free, dt, missing)
         self.candidates = [
             c
-            for c in self.candidates
+            for c in self._weighed(account, frame, free, dt, missing)
             if c.evidence.room < STANDING and c.evidence.behind < SOMEBODY_ELSE
         ]
         self.candidates.sort(key=lambda c: -c.probability)
@@ -252,12 +239,7 @@ class BySurface:
 
     def resume(self, found: Candidate) -> None:
         """Forget where the target went: it has come back elsewhere."""
-        self.motion = MotionFilter(
-            found.placed.position,
-            FIRST_SIGMA,
-            self._parameters.speed,
-            np.full(3, self._parameters.acceleration),
-        )
+        self.motion = self._motion_from(found.placed)
         self._middle.forget()
 
     def disown(self, gone: float) -> None:
@@ -334,9 +316,20 @@ class BySurface:
             reach = reach + 10.0
         return Expectation(self.motion.position, sigma, reach)
 
+    def _motion_from(self, placed: Placed) -> MotionFilter:
+        parameters = self._parameters
+        return MotionFilter(placed.position, FIRST_SIGMA, parameters.speed, parameters.acceleration)
+
     def _predict(self, dt: float, moved: Pose | None) -> None:
-        """Go on by ``dt`` seconds, with particles while the target is hidden."""
+        """Go on by ``dt`` seconds, with particles while the target is hidden.
+
+        ``moved`` is the last camera's pose in that of now, None where it stood.
+        """
         motion, hidden = self.motion, self.hidden_for > 0
+        if moved is not None:
+            motion.carried(moved)
+            if self._cloud is not None:
+                self._cloud.carried(moved)
         motion.predict(dt, HIDDEN_NOISE if hidden else 1.0)
         self._middle.predict(dt, moved)
         if not hidden or not self._parameters.use_particles:
@@ -360,7 +353,7 @@ class BySurface:
         said = [
             [Said(cue.name, value, cue.weight) for value in values.tolist()]
             for cue in self._cues
-            for values in [weighed(cue, frame, boxes, self._person.number)]
+            for values in [weighed(cue, frame, boxes, self.person.number)]
         ]
         more = list(zip(*said, strict=True)) if said else [()] * len(found)
         return [
@@ -377,7 +370,7 @@ class BySurface:
         more: tuple[Said, ...],
     ) -> Candidate:
         scene, body, motion = account.scene, self.body, self.motion
-        claim = account.claim(self._person, seen)
+        claim = account.claim(self.person, seen)
         sigma = motion.sigma
         placed = body.place(seen, scene.codes, scene.view, motion.position, sigma)
         variance = np.square(sigma) + np.square(placed.sigma)
@@ -418,7 +411,7 @@ class BySurface:
         """Whether a candidate is at the edge of what the camera sees, or came in there."""
         if seen.at_edge(account.scene.view, account.scene.rim):
             return True
-        stranger = account.stranger(self._person, account.sight_of(seen))
+        stranger = account.stranger(self.person, account.sight_of(seen))
         return stranger is not None and stranger.entered
 
     def _learn_around(self, scene: Scene, seen: Silhouette, dt: float | None) -> None:

@@ -148,8 +148,9 @@ class Follower:
                 )
             elif account is not None:
                 self._know_as_drawn(account, box, self._look)
-        belief = self._belief()
-        self.first = self.track = self._tracked(frame, box, 1.0, self._depth_of_surface(), belief)
+        depth = None if self.seen is None else self.seen.depth
+        belief = None if self._surface is None else self._surface.belief()
+        self.first = self.track = self._told(frame, box, 1.0, depth, belief)
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
         """What was weighed in the last frame, best first, and the box each would have given.
@@ -256,9 +257,6 @@ class Follower:
         if len(person.gallery.views) == 1:  # they say the same, and the box says more
             person.gallery = Gallery.of(known, account.time)
 
-    def _depth_of_surface(self) -> float | None:
-        return float(self._surface.motion.position[2]) if self._surface is not None else None
-
     def _by_surface(
         self,
         frame: Frame,
@@ -271,26 +269,27 @@ class Follower:
             surface.drift(dt)
             return self._glance(frame, None, view, dt, surface)
         found = surface.step(account, frame, dt)
-        if found is not None and self._passes(account, found):
+        if found is not None and self._passes(account, surface, found):
             found = None
         if surface.was_away:
-            self._withdraw()
-            if found is not None and self.person is not None:
-                unsure = self._returned(frame, account, dt, surface, found, self.person)
+            self._withdraw(surface)
+            if found is not None:
+                unsure = self._returned(frame, account, dt, surface, found)
                 if unsure is not None:
                     return unsure
         comeback = self._comeback
         score = self._score(account, dt, surface, found)
         if comeback is not None and comeback.denied:
-            self._disown(comeback, account.time)
+            self._crowd.disown(surface.person, comeback)
+            self.lose(account.time - comeback.left)
+            self._hidden_for -= dt  # which the step adds
             return self._hidden(frame, dt)
         if found is None:
             return self._glance(frame, account, view, dt, surface)
-        whole = self._whole(account, found.seen) or self._as_drawn(account, found.seen)
+        whole = self._whole(account, surface.person, found.seen)
+        whole = whole or self._as_drawn(account, found.seen)
         if whole is not None:
-            self._start_over(account, whole)
-            box = outline_box(account.scene, whole)
-            return self._tracked(frame, box, score, whole.depth, self._belief())
+            return self._locked(frame, account, self._anew(account, surface.person, whole), score)
         box = surface.take(account.scene, found)
         self.seen = found.seen
         self._shown = max(self._shown, found.seen.area)
@@ -298,43 +297,37 @@ class Follower:
             return Track(None, self._unseen(dt))  # a box on a stranger is worse than none
         outline = box_about(account.scene, found.seen)
         self._elsewhere.keep(account.scene.image, outline.over(account.scene.view.step))
-        if self.person is not None and score >= LEARNED:
+        if score >= LEARNED:
             for cue in self._cues:
-                cue.learn(frame, box, self.person.number)
-        if self._look is not None and not found.seen.cut.any and score >= LEARNED:
-            self._look.attend(frame, box, dt, ATTEND)
-        return self._tracked(frame, box, score, found.seen.depth, surface.belief())
+                cue.learn(frame, box, surface.person.number)
+            if self._look is not None and not found.seen.cut.any:
+                self._look.attend(frame, box, dt, ATTEND)
+        return self._told(frame, box, score, found.seen.depth, surface.belief())
 
-    def _passes(self, account: Account, found: Candidate) -> bool:
+    def _passes(self, account: Account, surface: BySurface, found: Candidate) -> bool:
         """Whether what depth shows looks unlike the target, beside where only its look was found.
 
         Of a target at the end of what depth sees it shows nothing, but of who passes it does.
         """
         last = self.track.box
-        if self._unread_for == 0 or last is None or self.person is None:
+        if self._unread_for == 0 or last is None:
             return False
         if box_about(account.scene, found.seen).iou(last) >= LOCK_IOU:
             return False
-        return self.person.gallery.log_odds(account.look(found.seen)) < UNLIKE
+        return surface.person.gallery.log_odds(account.look(found.seen)) < UNLIKE
 
     def _returned(
-        self,
-        frame: Frame,
-        account: Account,
-        dt: float,
-        surface: BySurface,
-        found: Candidate,
-        person: Person,
+        self, frame: Frame, account: Account, dt: float, surface: BySurface, found: Candidate
     ) -> Track | None:
         """The track of what may be the target that was away; None where it is taken to be it."""
-        index = account.sight_of(found.seen)
+        person, index = surface.person, account.sight_of(found.seen)
         stranger = account.stranger(person, index)
         # A part of somebody, where all of the target is a figure, tells not for good who it is;
         # but a thing that was in view until the camera paused is hardly another one.
         part = person.figure and surface.hidden_for > 0
         new = account.owner[index] < 0 if index >= 0 else part
         against = account.against * away(account.time - person.seen_at)
-        if new or (stranger is not None and not self._recognised(stranger, account.time)):
+        if new or (stranger is not None and not _recognised(stranger, person, account.time)):
             box = surface.box(account.scene, found)
             belief = surface.glimpse(account.scene, found)
             others = math.exp(against) + account.as_others(person, index)
@@ -344,7 +337,7 @@ class Follower:
             surface.miss(account.scene, dt)
             if score < EVEN:  # a box on a stranger is worse than none
                 return self._hidden(frame, dt)
-            return self._tracked(frame, box, score, found.seen.depth, belief)
+            return self._told(frame, box, score, found.seen.depth, belief)
         if person.figure and person.gallery.views:
             self._comeback = Comeback(person, account.time, against)
         surface.resume(found)
@@ -356,13 +349,12 @@ class Follower:
         """How surely what was found is the target, after a return beside what it was known by."""
         score = 0.0 if found is None else found.probability
         if found is not None and self._comeback is None and self._seen_again(surface, dt):
-            assert self.person is not None
             # His chances are those of this frame, and only his looks change them from here on.
-            against = self.person.gallery.log_odds(account.look(found.seen)) - logit(score)
-            self._comeback = Comeback(self.person, account.time, against, place=True)
-            self._likely(self._comeback, account, found)
+            against = surface.person.gallery.log_odds(account.look(found.seen)) - logit(score)
+            self._comeback = Comeback(surface.person, account.time, against, place=True)
+            _likely(self._comeback, account, surface.person, found)
         elif self._comeback is not None:
-            likely = self._likely(self._comeback, account, found)
+            likely = _likely(self._comeback, account, surface.person, found)
             if found is not None:
                 score *= likely.score
                 self._doubt(KNOWN_BEFORE, found, score)
@@ -378,43 +370,20 @@ class Follower:
         whom only a part is known looks otherwise. Where two may have changed places between two
         frames of a slow camera, though, either is held against whatever is known.
         """
-        person = self.person
-        if person is None or not person.figure:
+        person = surface.person
+        if not person.figure:
             return False
         if dt > LONG_STEP and surface.contested > CONTESTED:
             return bool(person.gallery.views)
         return (surface.hidden_for > 0 or dt > REUNION) and person.gallery.whole
 
-    def _likely(self, comeback: Comeback, account: Account, found: Candidate | None) -> Likely:
-        """Whether a returned target is the target, by what was known before it left."""
-        assert self.person is not None
-        mine = -1 if found is None else account.sight_of(found.seen)
-        look = None if found is None else account.look(found.seen)
-        others = {
-            account.people[owner].number: account.sights[index].view
-            for index, owner in enumerate(account.owner)
-            if owner >= 0
-            and index != mine
-            and account.people[owner] is not self.person
-            and account.people[owner].number not in comeback.met
-        }
-        known = account.as_others(self.person, mine)
-        followed = {person.number for person in account.owners if person.chosen}
-        return comeback.hear(look, others, known, account.time, followed)
-
-    def _withdraw(self) -> None:
+    def _withdraw(self, surface: BySurface) -> None:
         """What was learned of a return that was not borne out is not of the target."""
-        if self._comeback is not None and self.person is not None and not self._comeback.borne_out:
-            self._crowd.withdraw(self.person, self._comeback)
+        if self._comeback is not None and not self._comeback.borne_out:
+            self._crowd.withdraw(surface.person, self._comeback)
         self._comeback = None
 
-    def _disown(self, comeback: Comeback, time: float) -> None:
-        """Who came back is somebody else: the target is still away."""
-        assert self.person is not None
-        self._crowd.disown(self.person, comeback)
-        self.lose(time - comeback.left)
-
-    def _whole(self, account: Account, seen: Silhouette) -> Silhouette | None:
+    def _whole(self, account: Account, person: Person, seen: Silhouette) -> Silhouette | None:
         """All of somebody of whom something hid a part when he was chosen, as soon as it shows.
 
         Who once showed that much is not a part, though he may be half hidden again.
@@ -429,7 +398,7 @@ class Follower:
             return None
         if not TALLER < figure.seen.height < HEIGHT[1] or figure.seen.width > WIDTH[1]:
             return None
-        if owner >= 0 and account.people[owner] is not self.person:
+        if owner >= 0 and account.people[owner] is not person:
             return None
         return figure.seen if _as_deep(account, figure.seen, seen) else None
 
@@ -448,23 +417,13 @@ class Follower:
                 return sight.figure.seen
         return None
 
-    def _start_over(self, account: Account, whole: Silhouette) -> None:
-        assert self.person is not None
-        self.person.gallery = Gallery()
-        self._surface = BySurface(account, whole, self.person, self._parameters, self._cues)
+    def _anew(self, account: Account, person: Person, whole: Silhouette) -> BySurface:
+        """Follow what somebody turned out to be as if it had been chosen now."""
+        person.gallery = Gallery()
+        self._surface = BySurface(account, whole, person, self._parameters, self._cues)
         self._partial, self._shown = whole.cut.any, whole.area
         self.seen = whole
-
-    def _belief(self) -> Belief | None:
-        return None if self._surface is None else self._surface.belief()
-
-    def _recognised(self, stranger: Person, time: float) -> bool:
-        """Whether enough was seen of somebody to say for good that he is the target."""
-        assert self.person is not None
-        alike = stranger.resemblance(self.person.number)
-        if alike is None or stranger.sightings < RECOGNISED_SIGHTINGS:
-            return False
-        return time - stranger.first_seen >= RECOGNISED_AFTER and alike > RECOGNISED_ODDS
+        return self._surface
 
     def _glance(
         self,
@@ -478,8 +437,11 @@ class Follower:
         scene = None if account is None else account.scene
         if self._look is not None and view is not None:
             box = surface.expected_body.box(view)
-            blind = scene is None or surface.expected_body.unread(scene) > BLIND
-            blind = blind or self._held(scene, surface)
+            blind = (
+                scene is None
+                or surface.expected_body.unread(scene) > BLIND
+                or _held(scene, surface)
+            )
             # Who was away need not be where he was expected: what is like him may be anything.
             near = blind and not surface.was_away
             if near and box is not None and box.clipped(frame.width, frame.height) is not None:
@@ -488,43 +450,36 @@ class Follower:
                 if (
                     look is not None
                     and stood >= ELSEWHERE
-                    and not self._stood_there(account, look.box)
-                    and not self._unlike(account, look)
+                    and not self._stood_there(account, surface.person, look.box)
+                    and not self._unlike(account, surface, look)
                 ):
                     surface.seen_elsewhere(view, look.box)
-                    if account is not None and self.person is not None:
+                    if account is not None:
                         place = account.scene.axes @ surface.middle
-                        self.person.placed(place, account.time)
+                        surface.person.placed(place, account.time)
                     # What is not read is believed for as long as where who is hidden is.
                     unread = 0.0 if look.depth is not None else self._unread_for + dt
                     known = unread <= self._parameters.predict_for
                     belief = surface.belief() if known else None
-                    return self._tracked(frame, look.box, _score(look, stood), look.depth, belief)
+                    return self._told(frame, look.box, _score(look, stood), look.depth, belief)
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
-    def _held(self, scene: Scene | None, surface: BySurface) -> bool:
-        """Whether a small thing is one surface with what is where it is: the hand that holds it."""
-        if scene is None or self.person is None or self.person.area > SMALL:
-            return False
-        return surface.expected_body.as_deep(scene) > AS_DEEP
-
-    def _stood_there(self, account: Account | None, box: Box) -> bool:
+    def _stood_there(self, account: Account | None, person: Person, box: Box) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""
         if account is None:
             return False
         scene = account.scene
         return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
-            self.person is not None and self.person.mobile and room_share(account, box) > IS_ROOM
+            person.mobile and room_share(account, box) > IS_ROOM
         )
 
-    def _unlike(self, account: Account | None, look: Look) -> bool:
+    def _unlike(self, account: Account | None, surface: BySurface, look: Look) -> bool:
         """Whether what the look has found looks unlike the person who is followed."""
-        person, surface = self.person, self._surface
-        if account is None or person is None or surface is None or self._look is None:
+        if account is None or self._look is None:
             return False
         depth = float(surface.middle[2])
-        return unlike(person.gallery, account.scene, look.box, self._look, depth)
+        return unlike(surface.person.gallery, account.scene, look.box, self._look, depth)
 
     # -- by look ----------------------------------------------------------------------------------
 
@@ -548,13 +503,13 @@ class Follower:
         if said.look is None:
             return self._hidden(frame, dt)
         score = _score(said.look, said.stood)
-        return self._tracked(frame, said.look.box, score, said.look.depth)
+        return self._told(frame, said.look.box, score, said.look.depth)
 
     def _locked(self, frame: Frame, account: Account, surface: BySurface, score: float) -> Track:
         """The track of the frame from which on the target is followed by its surface."""
         assert self.seen is not None
         box = outline_box(account.scene, self.seen)
-        return self._tracked(frame, box, score, self.seen.depth, surface.belief())
+        return self._told(frame, box, score, self.seen.depth, surface.belief())
 
     def _known_by_box(self, account: Account, gated: GatedLook) -> tuple[Silhouette, float] | None:
         """Who has come and looks as what was drawn did, and how surely it is he."""
@@ -583,7 +538,7 @@ class Follower:
         others = math.exp(against) + account.as_others(person, index)
         score = mine / (sum(odds for odds, _ in likely.values()) + others)
         # Nor is of a fragment seen past somebody else known how large he is, who is to be followed.
-        enough = self._recognised(stranger, account.time) and stranger.upright
+        enough = _recognised(stranger, person, account.time) and stranger.upright
         enough = enough and not sight.figure.seen.cut.top
         if not enough or sight.figure.parted or score < EVEN:
             return None
@@ -597,36 +552,28 @@ class Follower:
         return TrackState.LOST if gone > self._parameters.lost_after else TrackState.OCCLUDED
 
     def _hidden(self, frame: Frame, dt: float) -> Track:
-        state = self._unseen(dt)
         belief = None
         if self._surface is not None and self._hidden_for + dt <= self._parameters.predict_for:
-            belief = in_metres(self._surface.belief(), frame)
-        if belief is None:
-            return Track(None, state)
-        return Track(
-            None,
-            state,
-            velocity=triple(belief.velocity),
-            covariance=row_by_row(belief.covariance),
-            predicted=triple(belief.position),
-            velocity_covariance=row_by_row(belief.velocity_covariance),
-        )
+            belief = self._surface.belief()
+        return self._told(frame, None, 0.0, None, belief, self._unseen(dt))
 
-    def _tracked(
+    def _told(
         self,
         frame: Frame,
-        box: Box,
+        box: Box | None,
         score: float,
         depth: float | None,
         belief: Belief | None = None,
+        state: TrackState = TrackState.TRACKING,
     ) -> Track:
         belief = in_metres(belief, frame)
         if belief is None:
-            return Track(box, TrackState.TRACKING, score, depth, frame.position(box, depth))
+            place = None if box is None else frame.position(box, depth)
+            return Track(box, state, score, depth, place)
         place = triple(belief.position)
         return Track(
             box,
-            TrackState.TRACKING,
+            state,
             score,
             depth,
             None if depth is None else place,
@@ -635,6 +582,38 @@ class Follower:
             predicted=place if depth is None else None,
             velocity_covariance=row_by_row(belief.velocity_covariance),
         )
+
+
+def _likely(
+    comeback: Comeback, account: Account, person: Person, found: Candidate | None
+) -> Likely:
+    """Whether a returned target is the target, by what was known before it left."""
+    mine = -1 if found is None else account.sight_of(found.seen)
+    look = None if found is None else account.look(found.seen)
+    others = {
+        account.people[owner].number: account.sights[index].view
+        for index, owner in enumerate(account.owner)
+        if owner >= 0
+        and index != mine
+        and account.people[owner] is not person
+        and account.people[owner].number not in comeback.met
+    }
+    known = account.as_others(person, mine)
+    followed = {person.number for person in account.owners if person.chosen}
+    return comeback.hear(look, others, known, account.time, followed)
+
+
+def _recognised(stranger: Person, person: Person, time: float) -> bool:
+    """Whether enough was seen of somebody to say for good that he is the target."""
+    alike = stranger.resemblance(person.number)
+    if alike is None or stranger.sightings < RECOGNISED_SIGHTINGS:
+        return False
+    return time - stranger.first_seen >= RECOGNISED_AFTER and alike > RECOGNISED_ODDS
+
+
+def _held(scene: Scene, surface: BySurface) -> bool:
+    """Whether a small thing is one surface with what is where it is: the hand that holds it."""
+    return surface.person.area <= SMALL and surface.expected_body.as_deep(scene) > AS_DEEP
 
 
 def _as_deep(account: Account, whole: Silhouette, part: Silhouette) -> bool:

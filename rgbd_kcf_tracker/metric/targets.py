@@ -100,7 +100,7 @@ class MetricTargets:
             BoxError: where no whole pixel of the box lies inside the frame.
         """
         require_inside(box, frame)
-        self._learn()
+        self.settle()
         if self._frame is not frame:
             if self._followers:  # where they were in the last frame, others stand in this
                 self.update(frame)

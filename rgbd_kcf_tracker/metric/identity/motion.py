@@ -21,7 +21,7 @@ class MotionFilter:
         position: ``(3,)`` metres.
         position_sigma: metres, one for all axes or ``(3,)``.
         speed_sigma: metres per second, likewise, of the unknown first velocity.
-        acceleration: metres per second squared, of the process noise.
+        acceleration: metres per second squared, likewise, of the process noise.
     """
 
     def __init__(
@@ -29,14 +29,14 @@ class MotionFilter:
         position: FloatArray,
         position_sigma: float | FloatArray,
         speed_sigma: float | FloatArray,
-        acceleration: FloatArray,
+        acceleration: float | FloatArray,
     ) -> None:
         self.position = np.array(position, dtype=np.float64)
         self.velocity = np.zeros(3)
         self._p00 = np.square(np.full(3, position_sigma, dtype=np.float64))
         self._p01 = np.zeros(3)
         self._p11 = np.square(np.full(3, speed_sigma, dtype=np.float64))
-        self._noise = np.array(acceleration, dtype=np.float64) ** 2
+        self._noise = np.square(np.full(3, acceleration, dtype=np.float64))
 
     @property
     def sigma(self) -> FloatArray:
