@@ -232,13 +232,34 @@ def test_who_is_chosen_with_his_head_hidden_is_known_from_where_the_box_begins()
     assert alike(hidden, whole) > 0.95
 
 
-def test_a_view_without_common_parts_says_nothing():
-    view = look(RED)
-    empty = View(np.zeros_like(view.roots), np.zeros_like(view.area), view.color, None)
-    assert alike(view, empty) == 0.0
+def part_of(view: View, slices: slice) -> View:
+    """A view of which only some slices show."""
+    area = np.zeros_like(view.area)
+    area[slices] = view.area[slices]
+    return dataclasses.replace(view, area=area)
+
+
+@pytest.mark.filterwarnings('error')
+def test_views_without_common_parts_say_nothing():
+    """Of whom only the upper half had been seen, his legs were held to be somebody else's."""
+    view = look(RED, GREEN)
     assert view.roots.shape[0] == SLICES
-    assert Gallery.of(view, 0.0).log_odds(empty) == 0.0
-    assert Gallery.of(empty, 0.0).log_odds(view) == 0.0
+    head, legs, empty = (part_of(view, rows) for rows in (np.s_[:3], np.s_[4:], np.s_[:0]))
+    for one, other in ((head, legs), (legs, head), (view, empty), (empty, view)):
+        assert same_person(one, other) == 0.5
+        gallery = Gallery.of(one, 0.0)
+        assert gallery.looks is not None
+        before = gallery.log_odds_before(1.0, other, similarity(other, gallery.looks))
+        assert gallery.log_odds(other) == before == 0.0
+        assert math.isnan(alike(one, other))
+        gallery.learn(other, 0.0)
+        assert gallery.views == [one, other], 'it shows what was not known'
+        before = gallery.log_odds_before(1.0, other, similarity(other, gallery.looks))
+        assert before is not None
+        assert (before == 0.0) if other is empty else (before > 1)
+    gallery = Gallery()
+    gallery._set_views([look(GREY), head, legs, look(BLUE), look(BLUE)], [0.0] * 5)
+    assert gallery._most_redundant() == 3, 'it says the same as the next'
 
 
 def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
@@ -1450,11 +1471,11 @@ def test_who_came_out_beside_another_and_has_his_number_is_who_was_hidden(
     here = [met(n, (0.5 * n, 3.0), views, known[n]) for n in range(2)]
     other = Person(2, np.array([0.0, 3.5]), 0.0, chosen)
     other.gallery.learn(look(hidden, hidden), 0.0)
-    gone = [(other, likeness(other, views))]
+    missing = [(other, likeness(other, views))]
     watch = MixUps()
     times = [10.0 + 0.1 * i for i in range(8)]
     other.seen_at = times[0] - gone
-    said = [watch.watch(here, gone, time) for time in times]
+    said = [watch.watch(here, missing, time) for time in times]
     assert said[0] is None, 'one sighting is too little'
     if not found:
         assert not any(said)
@@ -2342,10 +2363,11 @@ def test_who_once_showed_whole_is_not_taken_for_a_part_when_he_is_half_hidden_ag
     mask = whole.mask.copy()
     mask[:, mask.shape[1] // 3 :] = False
     part = dataclasses.replace(whole, mask=mask, area=whole.area / 3)
+    assert followed.person is not None
     followed._partial = True
-    assert followed._whole(account, part) is None
+    assert followed._whole(account, followed.person, part) is None
     followed._shown = part.area
-    assert followed._whole(account, part) is whole
+    assert followed._whole(account, followed.person, part) is whole
 
 
 @pytest.mark.parametrize('camera', ['noisy', 'noisy and stirs', 'repeats itself'])

@@ -424,7 +424,7 @@ def test_particles_die_where_the_camera_sees_past_them():
     for _ in range(30):
         hidden.move(1 / 30)
         hidden.weigh(1 / 30, view_of(depth), 0.5)
-    assert hidden.mean[0] > 0.1
+    assert hidden.believed[0][0] > 0.1
     left = hidden.distance(np.array([-0.3, -0.5, 2.5]), np.full(3, 0.05))
     right = hidden.distance(np.array([0.3, -0.5, 2.5]), np.full(3, 0.05))
     assert left > right + 1.0
@@ -451,7 +451,7 @@ def test_who_is_hidden_goes_on_as_far_at_any_rate(rate: int):
     for _ in range(2 * rate):
         hidden.move(1 / rate)
     keeps = TURN_TIME[0] * (1 - np.exp(-2 / TURN_TIME[0]))
-    assert hidden.mean[0] == pytest.approx(1.4 * keeps, abs=0.03)
+    assert hidden.believed[0][0] == pytest.approx(1.4 * keeps, abs=0.03)
     assert hidden.believed[1][0, 0] ** 0.5 == pytest.approx(1.14, abs=0.1)
 
 
@@ -469,16 +469,16 @@ def test_what_is_seen_past_a_particle_is_the_pixel_nearest_to_it():
 def test_who_is_hidden_behind_a_camera_that_turned_away_is_where_he_was():
     """He was put before the camera, wherever it looked, and there he was when it turned back."""
     hidden = cloud()
-    there = hidden.mean
+    there, _ = hidden.believed
     half, _ = cv2.Rodrigues(np.array([0.0, np.pi, 0.0]))
     turn = Pose(half, np.zeros(3))
     hidden.carried(turn)
     for _ in range(5):
         hidden.move(0.01)
         hidden.weigh(0.01, view_of(wall(5.0)), 0.5)
-    assert hidden.mean[2] < -2.0
+    assert hidden.believed[0][2] < -2.0
     hidden.carried(turn)
-    assert hidden.mean == pytest.approx(there, abs=0.1)
+    assert hidden.believed[0] == pytest.approx(there, abs=0.1)
 
 
 # -- the body -------------------------------------------------------------------------------------
@@ -530,7 +530,7 @@ def test_masked_filter_answers_with_the_shift():
     def read(x: float, y: float) -> Spectrum:
         return spectrum_of(features(resampled(image, x, y, 128, 128)))
 
-    learned = MaskedFilter(32, 1.2, 3)
+    learned = MaskedFilter(32, 1.2)
     mask = np.zeros((32, 32), np.float32)
     mask[10:22, 12:20] = 1
     learned.learn(read(200, 200), mask, 1.0)

@@ -423,15 +423,8 @@ class BySurface:
         x1 = int(min(max(right + wide, x0 + 1), cols))
         y0 = int(min(max(top, 0), rows - 2))
         y1 = int(min(max(bottom, y0 + 1), rows))
-        first, start = min(y0, seen.top), min(x0, seen.left)
-        other = (
-            scene.view.depth[first : max(y1, seen.rows.stop), start : max(x1, seen.cols.stop)] > 0
-        )
-        height, width = seen.mask.shape
-        v, u = seen.top - first, seen.left - start
-        other[v : v + height, u : u + width] &= ~seen.mask
-        other = other[y0 - first : y1 - first, x0 - start : x1 - start]
-        self.body.learn_around(scene.codes[y0:y1, x0:x1], other, dt)
+        part = slice(y0, y1), slice(x0, x1)
+        self.body.learn_around(seen, scene.codes, scene.view, part, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:
         """The box that a candidate would give, in pixels of the image."""

@@ -202,7 +202,13 @@ class Account:
         return look_of(self.scene, seen, top)
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
-        """What all that is known of the frame says of a silhouette being ``person``."""
+        """What all that is known of the frame says of a silhouette being ``person``.
+
+        Args:
+            person: somebody who was known before the frame.
+            seen: the silhouette.
+        """
+        row = self.people.index(person)
         # A small thing is no figure, but may be in the hands or at the feet of one.
         small = person.area < SMALL
         index = -1 if small else self.sight_of(seen)
@@ -210,10 +216,10 @@ class Account:
         stranger = self.stranger(person, index)
         if stranger is not None:
             look = stranger.resemblance(person.number)
-        if look is None and index >= 0 and person in self.people[: len(self.looks)]:
+        if look is None and index >= 0:
             whole = self.sights[index].figure.seen
             if SAME < whole.area / seen.area < 1 / SAME:
-                look = float(self.looks[self.people.index(person), index])
+                look = float(self.looks[row, index])
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
@@ -223,12 +229,11 @@ class Account:
             if stranger is not None and self.likest(stranger) is person:
                 assigned = 1
             elif self.verdict[index] >= 0:
-                assigned = 1 if self.people[self.verdict[index]] is person else -1
-            for row, other in enumerate(self.people[: len(self.odds)]):
-                if other is person:
-                    mine = float(self.odds[row, index])
-                elif other.number in person.met:
-                    rival = max(rival, float(self.odds[row, index]))
+                assigned = 1 if self.verdict[index] == row else -1
+            mine = float(self.odds[row, index])
+            for other, odds in zip(self.people, self.odds[:, index].tolist(), strict=False):
+                if other.number in person.met:
+                    rival = max(rival, odds)
         return Claim(look, mine, rival, assigned, self._room_beside(person, seen))
 
     def as_others(self, person: Person, index: int) -> float:
@@ -274,14 +279,10 @@ class Account:
             return share
         if last is None:
             return 0.0
-        y0, y1 = max(seen.rows.start, last.rows.start), min(seen.rows.stop, last.rows.stop)
-        x0, x1 = max(seen.cols.start, last.cols.start), min(seen.cols.stop, last.cols.stop)
-        if y0 >= y1 or x0 >= x1:
-            return share
         # What the outline of the last sight holds, about as deep, may have been the person.
-        mine = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
+        there, depth = (last.rows, last.cols), self.scene.view.depth
         step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)
-        mine = mine & (np.abs(self.scene.view.depth[y0:y1, x0:x1] - last.depth) < step)
+        mine = seen.in_view(depth.shape)[there] & (np.abs(depth[there] - last.depth) < step)
         return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
 
     def others(self, person: Person) -> Others:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -27,78 +29,70 @@ is away: a drawn box may hold two things, and what shows of one of them alone is
 the other is."""
 
 
-class Association:
-    """Weighs everyone who is known for each sight, by place, look and height."""
+def log_odds(
+    people: list[Person],
+    scene: Scene,
+    sights: list[Sight],
+    time: float,
+    against: float,
+    joined: Callable[[tuple[Looks, ...]], Looks],
+) -> tuple[FloatArray, FloatArray, list[Likeness]]:
+    """Of ``m`` people being ``n`` sights, by place, look and height.
 
-    def __init__(self) -> None:
-        self._known: list[Looks] = []
-        self._everyone: Looks | None = None
+    Args:
+        people: all who are known.
+        scene: of the frame.
+        sights: in it.
+        time: seconds.
+        against: log-odds against any one of those who are away coming back just now.
+        joined: :meth:`Looks.joined`, or what remembers what that gave.
 
-    def log_odds(
-        self, people: list[Person], scene: Scene, sights: list[Sight], time: float, against: float
-    ) -> tuple[FloatArray, FloatArray, Likeness]:
-        """Of ``m`` people being ``n`` sights.
-
-        Args:
-            people: all who are known.
-            scene: of the frame.
-            sights: in it.
-            time: seconds.
-            against: log-odds against any one of those who are away coming back just now.
-
-        Returns:
-            ``(m, n)`` log-odds, the same by the look and the height alone, and ``(v, n)`` likeness
-            to each known view.
-        """
-        odds = np.zeros((len(people), len(sights)))
-        looks = np.zeros_like(odds)
-        alike = np.zeros((0, len(sights)), np.float32)
-        if not odds.size:
-            return odds, looks, alike
-        known = [p.gallery.looks for p in people if p.gallery.looks is not None]
-        best: list[list[float]] = []
-        if known:
-            everyone = self._joined(known)
-            compared = [Compared.of(sight.view, everyone) for sight in sights]
-            alike = np.array([each.similarity() for each in compared]).T
-            starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
-            best = np.array([each.of_each(starts) for each in compared]).T.tolist()
-        rows = iter(best)
-        places = np.array([s.figure.place for s in sights])
-        low = np.array([not came(scene, s.figure.seen) for s in sights])
-        for row, person in enumerate(people):
-            likeness = next(rows) if person.gallery.looks is not None else None
-            for column, sight in enumerate(sights):
-                most = None if likeness is None else likeness[column]
-                looks[row, column] = person.gallery.log_odds(sight.view, most)
-            odds[row] = person.place_log_odds(places, time)
-            gone = away(time - person.seen_at)
-            if person.chosen:
-                odds[row] += np.minimum(looks[row], OF_TWO + gone)
-            else:
-                odds[row] += looks[row] - (against + SAME_AGAIN) * gone
-            if low.any() and time - person.seen_at > RECENT and (person.gallery.top or 0.0) > GROWN:
-                odds[row, low] = NEW - 1  # nor does he come back as a desk
-        return odds, looks, alike
-
-    def _joined(self, known: list[Looks]) -> Looks:
-        """All of some looks, which mostly are the same as in the frame before."""
-        last = self._known
-        if (
-            self._everyone is None
-            or len(known) != len(last)
-            or any(now is not before for now, before in zip(known, last, strict=True))
-        ):
-            self._known, self._everyone = known, Looks.joined(known)
-        return self._everyone
+    Returns:
+        ``(m, n)`` log-odds, the same by the look and the height alone, and for each of the people
+        ``(v, n)`` likeness to each of his views.
+    """
+    odds = np.zeros((len(people), len(sights)))
+    looks = np.zeros_like(odds)
+    alike = np.zeros((0, len(sights)), np.float32)
+    if not odds.size:
+        return odds, looks, [alike] * len(people)
+    known = tuple(p.gallery.looks for p in people if p.gallery.looks is not None)
+    best: list[list[float]] = []
+    if known:
+        everyone = joined(known)
+        compared = [Compared.of(sight.view, everyone) for sight in sights]
+        alike = np.array([each.similarity() for each in compared]).T
+        starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
+        best = np.array([each.of_each(starts) for each in compared]).T.tolist()
+    rows = iter(best)
+    places = np.array([s.figure.place for s in sights])
+    low = np.array([not came(scene, s.figure.seen) for s in sights])
+    for row, person in enumerate(people):
+        likeness = next(rows) if person.gallery.looks is not None else None
+        for column, sight in enumerate(sights):
+            most = None if likeness is None else likeness[column]
+            looks[row, column] = person.gallery.log_odds(sight.view, most)
+        odds[row] = person.place_log_odds(places, time)
+        gone = away(time - person.seen_at)
+        if person.chosen:
+            odds[row] += np.minimum(looks[row], OF_TWO + gone)
+        else:
+            odds[row] += looks[row] - (against + SAME_AGAIN) * gone
+        if low.any() and time - person.seen_at > RECENT and (person.gallery.top or 0.0) > GROWN:
+            odds[row, low] = NEW - 1  # nor does he come back as a desk
+    ends = np.cumsum([len(p.gallery.views) for p in people])
+    return odds, looks, np.split(alike, ends[:-1])
 
 
-def assigned(odds: FloatArray, sights: int) -> list[int]:
-    """For each sight who it is by the assignment that explains most, -1 for somebody new."""
-    owner = [-1] * sights
-    if odds.size:
-        rows, columns = linear_sum_assignment(-np.maximum(odds - NEW, 0))
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-            if odds[row, column] > NEW:
-                owner[column] = row
+def assigned(odds: FloatArray) -> list[int]:
+    """For each of ``n`` sights who it is by the assignment that explains most, -1 for a newcomer.
+
+    Args:
+        odds: ``(m, n)``, of ``m`` people being them, see :func:`log_odds`.
+    """
+    owner = [-1] * odds.shape[1]
+    rows, columns = linear_sum_assignment(-np.maximum(odds - NEW, 0))
+    for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+        if odds[row, column] > NEW:
+            owner[column] = row
     return owner

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection
+from functools import lru_cache
 
 import numpy as np
 
@@ -21,14 +22,14 @@ from rgbd_kcf_tracker.metric.decide.account import (
     look_of,
 )
 from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
-from rgbd_kcf_tracker.metric.decide.association import NEW, Association, assigned
+from rgbd_kcf_tracker.metric.decide.association import NEW, assigned, log_odds
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
-from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, Missing, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.decide.stayed import stayed
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -91,7 +92,8 @@ class Crowd:
         self._mix_ups = MixUps()
         self._arrivals = Arrivals()
         self._comebacks = Comebacks()
-        self._association = Association()
+        # Who is known, and how he looks, is mostly the same as in the frame before.
+        self._joined = lru_cache(maxsize=1)(Looks.joined)
 
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
@@ -233,7 +235,7 @@ class Crowd:
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
         sights = [Sight(f, look_of(scene, f.seen, f.top)) for f in figures]
         account, alike = self._explained(scene, sights, time)
-        mixed_up = self._mix_ups.watch(*_followed(account), alike, time)
+        mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
             other = mixed_up.second
             if other is None:
@@ -249,12 +251,12 @@ class Crowd:
 
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float
-    ) -> tuple[Account, Likeness]:
-        """The account of a frame, and the likeness of each sight to each known view, ``(v, n)``."""
+    ) -> tuple[Account, list[Likeness]]:
+        """The account of a frame, and how alike its sights are to each one's views, ``(v, n)``."""
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
         )
-        odds, looks, alike = self._association.log_odds(self.people, scene, sights, time, against)
+        odds, looks, alike = log_odds(self.people, scene, sights, time, against, self._joined)
         account = Account(
             scene,
             time,
@@ -266,7 +268,7 @@ class Crowd:
             against,
             self._comebacks.sure,
         )
-        account.verdict = assigned(odds, len(sights))
+        account.verdict = assigned(odds)
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
         # borne out over some sightings who he is.
         missed = [p.chosen and account.was_away(p) for p in self.people]
@@ -278,7 +280,7 @@ class Crowd:
                     # Nor is that sight anybody's who was seen beside him.
                     met = [person.number in self.people[row].met for person in self.people]
                     odds_of_here[met, column] = NEW - 1
-            account.owner = assigned(odds_of_here, len(sights))
+            account.owner = assigned(odds_of_here)
         return account, alike
 
     def _compare(self, account: Account, row: int, column: int) -> None:
@@ -450,26 +452,22 @@ class Crowd:
         learn_sighting(account, row, seen, index, sure)
 
 
-def _followed(account: Account) -> tuple[list[Followed], list[Missing]]:
-    """Those in view who are known, and those who are not in view, for :class:`MixUps`."""
-    ends = np.cumsum([len(person.gallery.views) for person in account.people]).tolist()
-    views = [
-        slice(end - len(person.gallery.views), end)
-        for end, person in zip(ends, account.people, strict=True)
-    ]
+def _followed(
+    account: Account, alike: list[Likeness]
+) -> tuple[list[Followed], list[tuple[Person, Likeness]]]:
+    """Those in view who are known, and those who are not in view, for :class:`MixUps`.
+
+    Args:
+        account: of the frame.
+        alike: for each of its people, ``(v, n)``, see :func:`~.association.log_odds`.
+    """
     here = [
-        Followed(
-            account.people[row],
-            account.sights[column].figure.place,
-            account.sights[column].view,
-            column,
-            views[row],
-        )
-        for column, row in enumerate(account.owner)
+        Followed(account.people[row], sight.figure.place, sight.view, column, alike[row])
+        for column, (row, sight) in enumerate(zip(account.owner, account.sights, strict=True))
         if row >= 0
     ]
     gone = [
-        Missing(person, views[row])
+        (person, alike[row])
         for row, person in enumerate(account.people)
         if row not in account.owner and person.alive and person.gallery.views
     ]

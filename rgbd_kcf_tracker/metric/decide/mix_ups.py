@@ -60,26 +60,14 @@ class Followed(NamedTuple):
         place: ``(2,)`` metres across and along the floor.
         view: his look.
         column: of his sight.
-        views: where the views of his gallery are among those of all.
+        alike: ``(v, n)`` likeness of each of the ``n`` sights to each view of his gallery.
     """
 
     person: Person
     place: FloatArray
     view: View
     column: int
-    views: slice
-
-
-class Missing(NamedTuple):
-    """Somebody who is not in view.
-
-    Attributes:
-        person: who.
-        views: where the views of his gallery are among those of all.
-    """
-
-    person: Person
-    views: slice
+    alike: Likeness
 
 
 class MixUp(NamedTuple):
@@ -121,14 +109,14 @@ class MixUps:
         self._time, self._counts = 0.0, 1.0
 
     def watch(
-        self, here: Sequence[Followed], gone: Sequence[Missing], alike: Likeness, time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Likeness]], time: float
     ) -> MixUp | None:
         """Take the next frame.
 
         Args:
             here: all in view, before this sight is learned.
-            gone: those who are not, and of whom a view is known.
-            alike: ``(v, n)`` likeness of each of ``n`` sights to each of the ``v`` known views.
+            gone: those who are not, and of whom a view is known, each with the likeness to his
+                views, as for those in view.
             time: seconds.
 
         Returns:
@@ -138,14 +126,12 @@ class MixUps:
         self._returns = {k: d for k, d in self._returns.items() if time - d.last < AFTER}
         self._counts = min(1.0, (time - self._time) / SIGHTING)
         found = (
-            self._returned(here, alike, time)
-            or self._met(here, alike, time)
-            or self._came_out(here, gone, alike, time)
+            self._returned(here, time) or self._met(here, time) or self._came_out(here, gone, time)
         )
         self._time = time
         return found
 
-    def _returned(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
+    def _returned(self, here: Sequence[Followed], time: float) -> MixUp | None:
         found = None
         for one in here:
             number = one.person.number
@@ -157,7 +143,7 @@ class MixUps:
             if doubt is None:
                 continue
             odds = one.person.gallery.log_odds_before(
-                doubt.since, one.view, alike[one.views, one.column]
+                doubt.since, one.view, one.alike[:, one.column]
             )
             if odds is None:
                 continue
@@ -167,7 +153,7 @@ class MixUps:
                 del self._returns[number]
         return found
 
-    def _met(self, here: Sequence[Followed], alike: Likeness, time: float) -> MixUp | None:
+    def _met(self, here: Sequence[Followed], time: float) -> MixUp | None:
         if len(here) < 2:
             return None
         found = None
@@ -184,7 +170,7 @@ class MixUps:
                 doubt = self._meetings.get(key)
                 if doubt is None:
                     continue
-                crosswise = _crosswise(one, other, alike, doubt.since)
+                crosswise = _crosswise(one, other, doubt.since)
                 if crosswise is None:
                     continue
                 odds, shows = crosswise
@@ -195,29 +181,29 @@ class MixUps:
         return found
 
     def _came_out(
-        self, here: Sequence[Followed], gone: Sequence[Missing], alike: Likeness, time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Likeness]], time: float
     ) -> MixUp | None:
         """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
         near = {number for pair in self._meetings for number in pair}
-        hidden = [each for each in gone if time - each.person.seen_at < HIDDEN_FOR]
+        hidden = [each for each in gone if time - each[0].seen_at < HIDDEN_FOR]
         tallies: dict[tuple[int, int], Tally] = {}
         found = None
         for one in here:
-            for other in hidden if one.person.number in near else ():
-                since = other.person.seen_at
-                if other.person.out_of_reach(one.place, time):
+            for other, alike in hidden if one.person.number in near else ():
+                since = other.seen_at
+                if other.out_of_reach(one.place, time):
                     continue
-                likeness = alike[:, one.column]
-                taken = one.person.gallery.log_odds_before(since, one.view, likeness[one.views])
+                taken = one.person.gallery.log_odds_before(
+                    since, one.view, one.alike[:, one.column]
+                )
                 if taken is None:
                     continue
-                odds = other.person.gallery.log_odds(one.view, float(likeness[other.views].max()))
-                key = one.person.number, other.person.number
+                odds = other.gallery.log_odds(one.view, float(np.fmax.reduce(alike[:, one.column])))
+                key = one.person.number, other.number
                 said = tallies[key] = self._hidden.get(key) or Tally()
                 said.add(min(odds, odds - taken), self._counts * one.view.shows, time)
                 if found is None and said.odds(SIGHTINGS) > ANOTHER:
-                    second = None if other.person.chosen else other.person
-                    found = MixUp(one.person, second, since)
+                    found = MixUp(one.person, None if other.chosen else other, since)
                     del tallies[key]
         self._hidden = tallies
         return found
@@ -230,9 +216,7 @@ def _by_places(one: Followed, other: Followed, time: float) -> float:
     return max(0.0, float(here[0] + there[1] - here[1] - there[0]))
 
 
-def _crosswise(
-    one: Followed, other: Followed, alike: Likeness, since: float
-) -> tuple[float, float] | None:
+def _crosswise(one: Followed, other: Followed, since: float) -> tuple[float, float] | None:
     """Log-odds that each of two is whom the other is taken for, by what was known before.
 
     Returns:
@@ -242,8 +226,8 @@ def _crosswise(
     shows = []
     for known, seen in ((one, other), (other, one)):
         gallery = known.person.gallery
-        odds = gallery.log_odds_before(since, seen.view, alike[known.views, seen.column])
-        as_taken = gallery.log_odds_before(since, known.view, alike[known.views, known.column])
+        odds = gallery.log_odds_before(since, seen.view, known.alike[:, seen.column])
+        as_taken = gallery.log_odds_before(since, known.view, known.alike[:, known.column])
         if odds is not None and as_taken is not None:
             crossed += odds
             straight += as_taken

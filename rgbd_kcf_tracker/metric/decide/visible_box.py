@@ -41,19 +41,13 @@ def outline_box(scene: Scene, seen: Silhouette) -> Box:
 
     See :func:`visible_box`.
     """
+    body, top = Body(seen), seen.metres[1]
     if any(_at_rim(scene, seen)):
-        body, top = Body(seen), seen.metres[1]
         body.learn_colors(seen, scene.codes, scene.view, top, None)
         wide = seen.mask.shape[1]
-        first = max(seen.left - wide, 0)
-        beside = scene.view.depth[seen.rows, first : seen.cols.stop + wide] > 0
-        beside[:, seen.left - first : seen.cols.stop - first] &= ~seen.mask
-        body.learn_around(scene.codes[seen.rows, first : seen.cols.stop + wide], beside, None)
-        return visible_box(scene, body, seen, top)
-    step = scene.view.step
-    return Box.from_corners(
-        seen.left * step, seen.top * step, seen.cols.stop * step, _foot(scene, seen) * step
-    )
+        about = seen.rows, slice(max(seen.left - wide, 0), seen.cols.stop + wide)
+        body.learn_around(seen, scene.codes, scene.view, about, None)
+    return visible_box(scene, body, seen, top)
 
 
 def _at_rim(scene: Scene, seen: Silhouette) -> tuple[bool, bool]:

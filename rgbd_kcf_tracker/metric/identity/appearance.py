@@ -80,7 +80,6 @@ class Appearance:
         rate: share of a new sample in the filter, for each thirtieth of a second.
         color_share: weight of the colour posterior beside the filter's response, 0 to 1.
         masked: hold the filter to the pixels of the target's colours, else to its box.
-        iterations: of the filter's solver for each sample.
     """
 
     def __init__(
@@ -94,7 +93,6 @@ class Appearance:
         rate: float,
         color_share: float,
         masked: bool = True,
-        iterations: int = 3,
     ) -> None:
         self.width, self.height = box.width, box.height
         root = float(np.sqrt(box.area))
@@ -105,7 +103,7 @@ class Appearance:
         scale = self._pixels / self._base
         self._target = (box.width * scale, box.height * scale)
         width = sigma * np.sqrt(self._target[0] * self._target[1]) / 16 / (self._pixels / cells)
-        self._filter = MaskedFilter(cells, max(0.6, float(width)), iterations)
+        self._filter = MaskedFilter(cells, max(0.6, float(width)))
         self._colors = ColorPosterior()
         self._rate = rate
         self._masked = masked

@@ -146,7 +146,7 @@ class Body:
         if seen.cut.left and seen.cut.right:
             low, high = sorted((right - self.width / 2, left + self.width / 2))
             return float(np.clip(expected, low, high)), sure + 0.25 * self.width
-        if not seen.cut.any or right - left >= self.width or not (seen.cut.left or seen.cut.right):
+        if right - left >= self.width or not (seen.cut.left or seen.cut.right):
             return (left + right) / 2, sure
         if seen.cut.left:
             return right - self.width / 2, sure + 0.1 * self.width
@@ -244,16 +244,27 @@ class Body:
         self._colors = (1 - r) * self._colors + r * (counts / np.maximum(total, 1)[:, None])
         self._odds = None
 
-    def learn_around(self, codes: Codes, known: npt.NDArray[np.bool_], dt: float | None) -> None:
-        """Follow the colours of what stands beside the body.
+    def learn_around(
+        self,
+        seen: Silhouette,
+        codes: ColorCodes,
+        view: DepthView,
+        part: tuple[slice, slice],
+        dt: float | None,
+    ) -> None:
+        """Follow the colours of what stands beside the body; a part without a reading is left out.
 
         Args:
-            codes: ``(h, w)`` of the colours about the body.
-            known: ``(h, w)`` bool, which of these pixels are of something beside it.
+            seen: its silhouette, which is not beside it.
+            codes: of the view's colours.
+            view: the depth.
+            part: rows and columns of the view about the body.
             dt: seconds since the last time, None at first.
         """
+        beside = view.depth > 0
+        beside[seen.rows, seen.cols] &= ~seen.mask
         rate = np.float32(0.7 if dt is None else 1 - np.exp(-dt / COLOR_TIME))
-        counts = np.bincount(codes[known], minlength=CODES).astype(np.float32)
+        counts = np.bincount(codes[part][beside[part]], minlength=CODES).astype(np.float32)
         counts = smoothed(counts[None])[0]
         total = counts.sum()
         if total > 20:

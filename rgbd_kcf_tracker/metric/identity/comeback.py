@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
@@ -35,14 +35,6 @@ below which he is somebody else after all: 3 to 1, as he was taken once already,
 this."""
 AGAIN = 0.15
 """Seconds after which somebody is looked at again: nobody looks otherwise before."""
-
-
-@dataclass
-class _Heard:
-    """What was heard of one, and when last, in seconds."""
-
-    tally: Tally = field(default_factory=Tally)
-    time: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +75,7 @@ class Comeback:
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
         self.likely: Likely | None = None
         self._new, self._settled, self._place = math.exp(against), False, place
-        self._mine, self._others = _Heard(), dict[int, _Heard]()
+        self._mine, self._others = Tally(), dict[int, Tally]()
 
     def hear(
         self,
@@ -108,14 +100,14 @@ class Comeback:
         if view is not None:
             self._look(self._mine, view, time)
         for number in others:
-            self._others.setdefault(number, _Heard())
+            self._others.setdefault(number, Tally())
         if others:
-            number = min(others, key=lambda each: self._others[each].time)
+            number = min(others, key=lambda each: self._others[each].last)
             self._look(self._others[number], others[number], time)
         mine = math.exp(self.odds)
         either, rival = mine, 0.0  # each may be the target, or none of them
         for number in others:
-            tally = self._others[number].tally
+            tally = self._others[number]
             odds = tally.mean or 0.0
             if odds > 0:
                 either += math.exp(odds)
@@ -134,11 +126,9 @@ class Comeback:
             person.gallery.taken_back(self.since)
         self._settled = True
 
-    def _look(self, heard: _Heard, view: View, time: float) -> None:
-        if time - heard.time < AGAIN:
-            return
-        heard.tally.add(self.known.log_odds(view), view.shows**2, time)
-        heard.time = time
+    def _look(self, tally: Tally, view: View, time: float) -> None:
+        if time - tally.last >= AGAIN:
+            tally.add(self.known.log_odds(view), view.shows**2, time)
 
     @property
     def denied(self) -> bool:
@@ -162,7 +152,7 @@ class Comeback:
         That many sightings say the same says little more: that two people wear the same does not
         change from frame to frame.
         """
-        return self._mine.tally.mean or 0.0
+        return self._mine.mean or 0.0
 
     @property
     def borne_out(self) -> bool:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 
@@ -34,13 +33,14 @@ class Elsewhere:
     """
 
     def __init__(self) -> None:
-        self._kept: list[tuple[Image, Box]] = []
-        self._refused: tuple[Image, Box] | None = None
+        # Each with the pixels of which it tells that the target was not there.
+        self._kept: list[tuple[Image, Mask]] = []
+        self._refused: list[tuple[Image, Mask]] = []
 
     def keep(self, image: Image, box: Box) -> None:
         """Take a picture, ``(h, w, 3)`` uint8 BGR, and where the target is in it, in its pixels."""
-        self._kept = [*self._kept[:1], (image, box)]
-        self._refused = None
+        self._kept = [*self._kept[:1], (image, ~_inside(image, box))]
+        self._refused = []
 
     def refuse(self, image: Image, box: Box) -> None:
         """Take a picture of which a box shows something else than the target.
@@ -49,11 +49,11 @@ class Elsewhere:
             image: ``(h, w, 3)`` uint8 BGR.
             box: in its pixels.
         """
-        self._refused = image, box
+        self._refused = [(image, _inside(image, box))]
 
     def forget(self) -> None:
         """Drop all: the camera has moved."""
-        self._kept, self._refused = [], None
+        self._kept, self._refused = [], []
 
     def unchanged(self, image: Image, box: Box) -> bool:
         """Whether a box shows what was there while the target was elsewhere.
@@ -63,20 +63,18 @@ class Elsewhere:
             box: in its pixels.
         """
         part = part_in(image.shape, box.scaled(MIDDLE))
-        for then, place in self._kept:
-            elsewhere = np.ones(then.shape[:2], np.bool_)
-            elsewhere[part_in(then.shape, place)] = False
-            if _same(image, then, part, elsewhere):
-                return True
-        if self._refused is None:
-            return False
-        then, place = self._refused
-        there = np.zeros(then.shape[:2], np.bool_)
-        there[part_in(then.shape, place)] = True
-        return _same(image, then, part, there)
+        pictures = self._kept + self._refused
+        return any(_same(image, then, part, there) for then, there in pictures)
 
 
-def _same(now: Image, then: Image, part: tuple[slice, slice], there: npt.NDArray[np.bool_]) -> bool:
+def _inside(image: Image, box: Box) -> Mask:
+    """Which pixels of a picture a box covers, ``(h, w)`` bool."""
+    inside = np.zeros(image.shape[:2], np.bool_)
+    inside[part_in(image.shape, box)] = True
+    return inside
+
+
+def _same(now: Image, then: Image, part: tuple[slice, slice], there: Mask) -> bool:
     """Whether a part of a picture shows what it showed, as far as ``there`` tells of it."""
     if then.shape != now.shape:
         return False

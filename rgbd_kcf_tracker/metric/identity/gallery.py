@@ -221,8 +221,8 @@ class Compared:
     def similarity(self) -> Floats:
         """How alike the view is to each of the others, ``(n,)``, 0 to 1.
 
-        The mean over the slices that show in both, at the best of the shifts of lightness; 0 where
-        no slice can be compared.
+        The mean over the slices that show in both, at the best of the shifts of lightness; NaN
+        where there is none, so that nothing is known.
         """
         return _best(self.weight, self.alike)
 
@@ -244,14 +244,15 @@ class Compared:
         weight = np.where(shows, self.weight, most[whose])
         alike = np.where(shows[..., None], self.alike, best[whose])
         found: Floats = np.maximum.reduceat(_best(weight, alike), starts)
-        found[~most.any(axis=1)] = np.nan
         return found
 
 
 def _best(weight: Floats, alike: Floats) -> Floats:
-    share = weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-9)
+    total = weight.sum(axis=1, keepdims=True)
+    share = weight / np.maximum(total, 1e-9)
     mean = (share[:, None, :] @ alike)[:, 0] - _COST
     best: Floats = np.maximum(mean.max(axis=1), 0)
+    best[total[:, 0] == 0] = np.nan
     return best
 
 
@@ -264,7 +265,7 @@ def look_log_odds(alike: float, area: float, views: int = 1, grey: bool = False)
     """Log-odds that a view is of the person, from its likeness to the most alike view of his.
 
     Args:
-        alike: see :func:`similarity`.
+        alike: see :func:`similarity`, no NaN.
         area: square metres that show of the view, or of the largest that it was compared with,
             whichever is less.
         views: how many views of his it was compared with.
@@ -293,9 +294,8 @@ def _normal(x: float, sigma: float) -> float:
 
 def same_person(first: View, second: View) -> float:
     """Probability that two sightings show the same person, 0 to 1; 0.5 where they say nothing."""
-    alike = float(similarity(first, Looks.of([second]))[0])
-    odds = look_log_odds(alike, min(first.total, second.total), grey=first.grey)
-    odds += height_log_odds(first.top, second.top)
+    look = Gallery.of(second, 0.0).log_odds(first)
+    odds = look + height_log_odds(first.top, second.top)
     return float(1 / (1 + np.exp(-odds)))
 
 
@@ -353,7 +353,7 @@ class Gallery:
             alike: its likeness to each of the gallery, ``(n,)``.
         """
         old = alike[np.array(self._learned) < time]
-        return self._log_odds(view, float(old.max()), len(old)) if len(old) else None
+        return self._log_odds(view, float(np.fmax.reduce(old)), len(old)) if len(old) else None
 
     def _log_odds(self, view: View, alike: float | None, views: int) -> float:
         odds = height_log_odds(view.top, self.top)
@@ -381,8 +381,7 @@ class Gallery:
             time: seconds, when it was seen.
         """
         if self.looks is not None:
-            alike = similarity(view, self.looks)
-            if alike.max() > NOVEL:
+            if (similarity(view, self.looks) > NOVEL).any():
                 return
             if len(self.views) >= MOST_VIEWS:
                 # Of the two most alike the older goes, never the first, which is what was chosen.
@@ -424,6 +423,6 @@ class Gallery:
 
     def _most_redundant(self) -> int:
         assert self.looks is not None
-        likeness = np.stack([similarity(v, self.looks) for v in self.views])
+        likeness = np.nan_to_num(np.stack([similarity(v, self.looks) for v in self.views]))
         np.fill_diagonal(likeness, 0)
         return 1 + int(np.argmax(likeness[1:].max(axis=1)))

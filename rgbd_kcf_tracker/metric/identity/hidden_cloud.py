@@ -123,12 +123,6 @@ class HiddenCloud:
         return empty
 
     @property
-    def mean(self) -> FloatArray:
-        """Weighted mean position, ``(3,)`` metres."""
-        result: FloatArray = self._weights @ self._positions
-        return result
-
-    @property
     def believed(self) -> tuple[FloatArray, FloatArray]:
         """Weighted mean position, ``(3,)`` metres, and its covariance, ``(3, 3)``."""
         return self._moments(self._positions)

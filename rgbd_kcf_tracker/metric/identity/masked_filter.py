@@ -27,6 +27,8 @@ PENALTY_MAX = 20.0
 """Weight of the constraint in the solver's first round, by how much it grows from round to round,
 and the most that it becomes: those of Lukezic et al. (CVPR 2017, section 3.2) and of their
 program."""
+ROUNDS = 3
+"""Rounds of the solver for each sample: in the last of them that weight is at its most."""
 SPARSITY = 0.01
 """Weight of the filter's own size against its fit, that of the same paper; it keeps what the window
 does not tell small."""
@@ -44,14 +46,12 @@ class MaskedFilter:
     Args:
         size: cells along a side of the window.
         sigma: width of the wanted response in cells.
-        iterations: of the solver for each sample.
     """
 
-    def __init__(self, size: int, sigma: float, iterations: int) -> None:
+    def __init__(self, size: int, sigma: float) -> None:
         self.size = size
         labels = gaussian_labels((size, size), sigma, np.float32)
         self._label = np.conj(fft.rfft2(labels)).astype(np.complex64)
-        self._iterations = iterations
         self._filter: Spectrum | None = None
         self._weights: npt.NDArray[np.float32] | None = None
 
@@ -65,7 +65,7 @@ class MaskedFilter:
         first = fft.irfft2(cross * (1 / (power + slack * penalty)), s=shape)
         masked = fft.rfft2(first * mask)
         multiplier = np.zeros_like(cross)
-        for _ in range(self._iterations):
+        for _ in range(ROUNDS):
             free = cross + penalty * masked
             free -= multiplier
             free *= 1 / (power + penalty)

@@ -132,8 +132,8 @@ class MiddleFilter:
         self._step = self._down_sigma = 0.0
 
     def predict(self, dt: float, moved: Pose | None = None) -> None:
-        """Go on by ``dt`` seconds; ``moved`` is the last camera's pose in that of now."""
-        if self._motion is None or dt <= 0:
+        """Go on by ``dt`` > 0 seconds; ``moved`` is the last camera's pose in that of now."""
+        if self._motion is None:
             return
         if moved is not None:
             self._motion.carried(moved)

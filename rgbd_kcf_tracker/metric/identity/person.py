@@ -59,6 +59,9 @@ ANYWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden): of some
 fifty boxes one is on something else."""
 
+_OF_NOW = 'place', 'velocity', 'seen_at', 'came', 'misses', 'last', 'calm', 'hidden', 'figure'
+"""Attributes that go along with who is seen where he turns out to be somebody else."""
+
 
 class Person:
     """One identity.
@@ -218,10 +221,7 @@ class Person:
     def become(self, newcomer: Person) -> None:
         """Go on as somebody who has turned out to be the same."""
         if newcomer.seen_at > self.seen_at:
-            self.place, self.velocity = newcomer.place, newcomer.velocity
-            self.seen_at, self.last, self.misses = newcomer.seen_at, newcomer.last, newcomer.misses
-            self.hidden, self.came = newcomer.hidden, newcomer.came
-            self.figure, self.calm = newcomer.figure, newcomer.calm
+            vars(self).update(newcomer._of_now())
         self.sightings += newcomer.sightings
         self.area = max(self.area, newcomer.area)
         self.upright |= newcomer.upright
@@ -237,20 +237,17 @@ class Person:
             other: the other.
             since: seconds; what was learned of their looks from then on goes along.
         """
-        self.place, other.place = other.place, self.place
-        self.velocity, other.velocity = other.velocity, self.velocity
-        self.seen_at, other.seen_at = other.seen_at, self.seen_at
-        self.came, other.came = other.came, self.came
-        self.misses, other.misses = other.misses, self.misses
-        self.last, other.last = other.last, self.last
-        self.calm, other.calm = other.calm, self.calm
-        self.hidden, other.hidden = other.hidden, self.hidden
-        self.figure, other.figure = other.figure, self.figure
+        of_now = self._of_now()
+        vars(self).update(other._of_now())
+        vars(other).update(of_now)
         mine, his = self.gallery.taken_back(since), other.gallery.taken_back(since)
         self.gallery.take(his)
         other.gallery.take(mine)
         self._resembles, other._resembles = {}, {}
         self.again = other.again = -math.inf
+
+    def _of_now(self) -> dict[str, object]:
+        return {name: getattr(self, name) for name in _OF_NOW}
 
     def carried(self, motion: Pose, axes: FloatArray, now: FloatArray) -> None:
         """Keep the place and the velocity in the world while the camera moves.

@@ -22,10 +22,15 @@ each other show nearly the same."""
 
 
 class Tally:
-    """Log-odds that sightings gave, of which those of late and those that show more count more."""
+    """Log-odds that sightings gave, of which those of late and those that show more count more.
+
+    Attributes:
+        last: seconds of the last of them, minus infinity before the first.
+    """
 
     def __init__(self) -> None:
-        self._total = self._count = self._last = 0.0
+        self._total = self._count = 0.0
+        self.last = -math.inf
 
     def add(self, odds: float, weight: float, time: float) -> None:
         """Take a sighting.
@@ -36,10 +41,10 @@ class Tally:
                 his as well.
             time: seconds; what was seen before counts less.
         """
-        kept = math.exp((self._last - time) / LATELY)
+        kept = math.exp((self.last - time) / LATELY)
         self._total = kept * self._total + weight * odds
         self._count = kept * self._count + weight
-        self._last = time
+        self.last = time
 
     @property
     def mean(self) -> float | None:
