@@ -37,7 +37,7 @@ from rgbd_kcf_tracker.insight import of_metric
 from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
-from rgbd_kcf_tracker.metric.decide import evidence, mix_ups
+from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight, look_of
 from rgbd_kcf_tracker.metric.decide.arrivals import (
     GONE,
@@ -184,7 +184,7 @@ def test_who_stands_before_the_pictures_upper_end_is_compared_from_where_his_hea
             above = 0.9 - (rows - CAMERA.cy) * scene.view.depth / CAMERA.fy
             scene = dataclasses.replace(scene, elevation=above.astype(np.float32))
         (figure,) = find_figures(scene, np.zeros((0, 2)))
-        return look_of(scene, figure.seen, figure.top)
+        return look_of(scene, figure.seen)
 
     far, near = seen(3.0), seen(1.0)
     assert near.top is None
@@ -207,7 +207,7 @@ def test_who_shows_beside_the_end_of_depth_is_compared_from_where_his_head_is(he
         above = 0.9 - (rows - CAMERA.cy) * scene.view.depth / CAMERA.fy
         scene = dataclasses.replace(scene, elevation=above.astype(np.float32))
         (figure,) = find_figures(scene, np.zeros((0, 2)))
-        return look_of(scene, figure.seen, figure.top), figure.seen.width
+        return look_of(scene, figure.seen), figure.seen.width
 
     whole, _ = seen(1.0)
     beside, wide = seen(0.02 if head else -0.12)
@@ -619,7 +619,7 @@ def test_who_stood_there_is_no_part_of_the_room_when_the_camera_turns_back(why: 
     before = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(colors, depth, 0, CAMERA), 0.1)
     assert before is not None
     seen = before.silhouette(int(before.surfaces.labels[40, round(one.box.cx)]))
-    person.gallery.learn(look_of(before, seen, None), 0.0)
+    person.gallery.learn(look_of(before, seen), 0.0)
     account = crowd.explain(scene, 1.0, reader.is_somebody)
     assert len(account.sights) == (why == 'stayed')
     if why == 'stayed':
@@ -1391,32 +1391,6 @@ def met(number: int, place: tuple[float, float], seen: Sequence[View], learned: 
     return Followed(person, person.place, seen[number], number, likeness(person, seen))
 
 
-@pytest.mark.parametrize(
-    ('apart', 'seen', 'known', 'mixed_up'),
-    [
-        (0.5, (RED, GREEN), (GREEN, RED), True),
-        (0.5, (RED, GREEN), (GREEN, None), True),  # the other one has just come
-        (0.5, (RED, GREEN), (RED, GREEN), False),
-        (0.5, (RED, RED), (RED, RED), False),  # twins
-        (0.5, (BLUE, GREEN), (GREY, None), False),  # turned round, and a stranger beside him
-        (0.5, (RED, GREEN), (None, None), False),
-        (3.0, (RED, GREEN), (GREEN, RED), False),  # too far apart
-    ],
-)
-def test_two_who_met_are_told_apart_again_by_how_they_looked_before(apart, seen, known, mixed_up):
-    views = [look(shirt, shirt) for shirt in seen]
-    learned = [None if shirt is None else look(shirt, shirt) for shirt in known]
-    here = [met(n, (n * apart, 3.0), views, learned[n]) for n in range(2)]
-    watch = MixUps()
-    found = [watch.watch(here, [], 10.0 + 0.1 * i) for i in range(8)]
-    assert found[0] is None, 'one sighting is too little'
-    assert any(found) == mixed_up
-    if mixed_up:
-        first = next(each for each in found if each is not None)
-        assert {first.first, first.second} == {one.person for one in here}
-        assert first.since == pytest.approx(9.0)
-
-
 @pytest.mark.parametrize('chosen', [True, False])
 def test_what_was_learned_in_a_return_that_is_not_borne_out_is_taken_back_after_a_while(chosen):
     """By one sight a stranger was taken for who had gone, and both were learned as one for good."""
@@ -1433,22 +1407,6 @@ def test_what_was_learned_in_a_return_that_is_not_borne_out_is_taken_back_after_
         watched.see(dt=AFTER / 2)
     # Who was chosen is asked for elsewhere whether he is the one who came back.
     assert len(one.gallery.views) == views + chosen
-
-
-@pytest.mark.parametrize(('apart', 'mixed_up'), [(0.1, True), (0.9, False)])
-def test_two_who_never_came_so_near_that_places_could_mislead_are_not_exchanged(
-    apart: float, mixed_up: bool
-):
-    """Two in dark clothes walked by each other, and one was followed as the other from then on."""
-    views = look(RED, RED), look(GREEN, GREEN)
-    here = [met(n, (n * apart, 3.0), views, views[1 - n]) for n in range(2)]
-    watch = MixUps()
-    found = []
-    for time in np.arange(10.0, 11.0, 0.1):
-        for one in here:
-            one.person.moved_to(one.place, time - 0.1)
-        found.append(watch.watch(here, [], time))
-    assert any(found) == mixed_up
 
 
 @pytest.mark.parametrize(
@@ -1505,22 +1463,19 @@ def test_who_comes_where_another_was_lost_is_somebody_new_if_he_looks_otherwise(
         assert taken_for[-1].number != one.number
 
 
-def test_those_who_were_taken_for_one_another_get_their_numbers_back(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    monkeypatch.setattr(mix_ups, '_by_places', lambda *_: 0.0)
-    watched = Watched()
-    account, columns = watched.beside(RED, GREEN)
-    red, green = (who(account, c) for c in columns)
-    red.exchange(green, np.inf)  # as where one passes behind the other
-    people = Someone(-0.45, 3.0, RED), Someone(0.5, 3.0, GREEN)
-    account = watched.see(*people)
-    assert who(account, int(np.argmin([s.figure.place[0] for s in account.sights]))) is green
-    for _ in range(6):
-        account = watched.see(*people)
-    assert who(account, int(np.argmin([s.figure.place[0] for s in account.sights]))) is red
-    assert red.gallery.log_odds(look(GREEN)) < 0 < red.gallery.log_odds(look(RED))
-    assert green.gallery.log_odds(look(RED)) < 0 < green.gallery.log_odds(look(GREEN))
+def test_two_who_were_taken_for_one_another_go_on_as_each_other_with_what_was_learned_since():
+    one, other = (Person(n, np.array([n, 3.0]), 0.0) for n in range(2))
+    for person, before, since in ((one, RED, GREEN), (other, GREEN, RED)):
+        person.gallery.learn(look(before), 0.0)
+        person.gallery.learn(look(since, BLUE), 5.0)
+        person.moved_to(person.place + 0.1, 5.0 + person.number)
+    one.exchange(other, 4.0)
+    assert (one.place[0], one.seen_at) == (1.1, 6.0)
+    assert (other.place[0], other.seen_at) == (0.1, 5.0)
+    for person, shirt, others in ((one, RED, GREEN), (other, GREEN, RED)):
+        assert len(person.gallery.views) == 2
+        assert person.gallery.log_odds(look(others, BLUE)) < 0
+        assert person.gallery.log_odds(look(shirt, BLUE)) > 0
 
 
 def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
@@ -2001,7 +1956,7 @@ def test_of_whom_depth_reads_no_more_the_room_beside_him_is_not_how_he_looks(
     assert scene is not None
     (figure,) = find_figures(scene, np.zeros((0, 2)))
     gallery = Gallery()
-    gallery.learn(look_of(scene, figure.seen, figure.top), 0.3)
+    gallery.learn(look_of(scene, figure.seen), 0.3)
     by_look = ByLook(frame, one.box, MetricParameters())
     # The box of a look is as broad as his longest stride.
     stride = Box(one.box.cx - 2 * one.box.width, one.box.y, 4 * one.box.width, one.box.height)
@@ -2075,7 +2030,9 @@ def test_who_comes_where_somebody_was_drawn_looks_as_he_did(
 ):
     """By colours alone one in a green shirt was he who was drawn in a white one, at 0.99."""
     monkeypatch.setattr(ByLook, 'step', lambda *args: None)
-    monkeypatch.setattr(ByLook, 'likely', lambda *args: 0.9)
+    monkeypatch.setattr(
+        ByLook, 'own', lambda look, image: np.full(image.shape[:2], 0.9, np.float32)
+    )
     tracker = create_tracker('metric')
     for i in range(8):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
@@ -2178,7 +2135,9 @@ def test_who_has_the_number_but_not_the_look_of_one_who_stood_beside_may_be_the_
 ):
     """Depth showed another; in the next frame he has gone and the target stands where he did."""
     monkeypatch.setattr(ByLook, 'step', lambda *args: None)
-    monkeypatch.setattr(ByLook, 'likely', lambda *args: 0.9)
+    monkeypatch.setattr(
+        ByLook, 'own', lambda look, image: np.full(image.shape[:2], 0.9, np.float32)
+    )
     tracker = create_tracker('metric')
     beside = Someone(0.15, 3.1, GREEN, BLUE)
     for i in range(2):

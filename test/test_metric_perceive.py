@@ -43,8 +43,15 @@ def with_thing(z: float = 2.0) -> np.ndarray:
 # -- the room -------------------------------------------------------------------------------------
 
 
-def see(room: Room, depth: np.ndarray, seconds: float, somebody: np.ndarray | None) -> None:
-    room.update(depth, seconds, somebody, surfaces_in(depth, depth > 0, 0.04, 0.03))
+def see(
+    room: Room,
+    depth: np.ndarray,
+    seconds: float,
+    somebody: np.ndarray | None,
+    undecided: np.ndarray | None = None,
+) -> None:
+    surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
+    room.update(depth, seconds, somebody, surfaces, undecided=undecided)
 
 
 def known_room(depth: np.ndarray) -> Room:
@@ -284,7 +291,7 @@ def test_a_reading_unlike_all_about_it_is_not_learned_before_a_camera_that_moves
     room.moved(AHEAD, CAMERA)
     noisy = wall(WALL - 0.05)
     noisy[80, 220] = 0.9
-    see(room, noisy, 0.1, None)
+    see(room, noisy, 0.1, None, NOBODY)
     assert room.depth[80, 220] == 0
     assert (room.depth[60:100, 202:218] == noisy[60:100, 202:218]).all()
 
@@ -924,7 +931,7 @@ def test_who_stands_half_behind_another_is_not_joined_with_him():
     assert len(figures) == 2
     left, right = sorted(figures, key=lambda figure: figure.place[0])
     assert outline(left.seen).iou(people[0].box) > 0.9
-    assert right.seen.at_edge(scene_of([]).view, Rim()) is False
+    assert not right.seen.ends(scene_of([]).view, Rim()).any
     assert not left.parted
 
 

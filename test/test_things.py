@@ -138,7 +138,7 @@ def motions(sequence: SimulatedSequence, frames: range, beyond: float) -> list[P
         view = DepthView.of(frame, 240)
         assert view is not None
         near = (view.depth > 0) & (view.depth < beyond) if near is None else near
-        image = view_image(frame.color, view.step, view.shape)
+        image = view_image(frame.color, view.step)
         told.append(ego.update(image, view, near, 1 / sequence.rate_hz))
         ego.settle()
     return told

@@ -266,7 +266,7 @@ def _motion(first: Frame, then: Frame) -> Pose | None:
     for frame in (first, then):
         view = DepthView.of(frame, VIEW)
         assert view is not None
-        image = view_image(frame.color, view.step, view.shape)
+        image = view_image(frame.color, view.step)
         motion = told.update(image, view, np.zeros(view.shape, np.bool_), seconds)
     return None if isinstance(motion, Lost) else motion or Pose(np.eye(3), np.zeros(3))
 

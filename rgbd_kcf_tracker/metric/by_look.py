@@ -204,7 +204,7 @@ class ByLook:
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio and not (
                 sighting.ratio > BORNE_OUT * parameters.hidden_ratio
-                and as_near(self._depth_of(frame, sighting), self._depth)
+                and as_near(depth_in(frame, self._box_at(sighting)), self._depth)
             )
         self.response = sighting.ratio
         if self._hidden:
@@ -296,15 +296,6 @@ class ByLook:
     def unread(self) -> bool:
         """Whether depth showed nothing of the target when it was chosen."""
         return self._first_depth is None
-
-    def likely(self, image: Image, mask: npt.NDArray[np.bool_]) -> float:
-        """Mean probability of some pixels' colours to be the target's and not those around it.
-
-        Args:
-            image: ``(h, w, 3)`` uint8 BGR.
-            mask: ``(h, w)`` bool with a pixel at least.
-        """
-        return float(self.own(image)[mask].mean())
 
     def own(self, image: Image) -> npt.NDArray[np.float32]:
         """Probability of each pixel's colour to be the target's and not of what is around it.
@@ -406,9 +397,6 @@ class ByLook:
 
     def _box_at(self, sighting: Sighting) -> Box:
         return Box.from_center(sighting.cx, sighting.cy, *self._size)
-
-    def _depth_of(self, frame: Frame, sighting: Sighting) -> float | None:
-        return depth_in(frame, self._box_at(sighting))
 
     def _there(self, frame: Frame, small: Image, expected: Box) -> Sighting | None:
         """What is where a hidden target stands, if depth bears out that it is still there.
@@ -536,9 +524,7 @@ def _averaged(frame: Frame) -> Image:
 
 def _small(frame: Frame) -> Image:
     """Every so many pixels of a frame's colours, about ``SEARCH_WIDTH`` columns."""
-    step = _step_of(frame)
-    rows, cols = (len(range(step // 2, side, step)) for side in (frame.height, frame.width))
-    return view_image(frame.color, step, (rows, cols))
+    return view_image(frame.color, _step_of(frame))
 
 
 def as_near(depth: float | None, other: float | None) -> bool:

@@ -409,7 +409,7 @@ class BySurface:
 
     def _came_in(self, account: Account, seen: Silhouette) -> bool:
         """Whether a candidate is at the edge of what the camera sees, or came in there."""
-        if seen.at_edge(account.scene.view, account.scene.rim):
+        if seen.ends(account.scene.view, account.scene.rim).any:
             return True
         stranger = account.stranger(self.person, account.sight_of(seen))
         return stranger is not None and stranger.entered

@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.drawn import Drawn, unlike
 from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
-from rgbd_kcf_tracker.metric.initialisation import SAME_OUTLINE, whole_of
+from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -54,9 +54,6 @@ READ = 0.5
 no reading may be the target."""
 NEAREST = 0.2
 """Metres before the camera from which a place is in the image: nothing is read nearer."""
-OUTLINED = 0.5
-"""Overlap of a box with a figure's outline from which it is that figure, and not a part of it: from
-which a box counts as right (PASCAL VOC)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +290,7 @@ class GatedLook:
         if _area(account.scene.view, look) < SMALL:
             return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
         outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
-        return all(outline.iou(box) < OUTLINED for outline in outlines)
+        return all(outline.iou(box) < LOCK_IOU for outline in outlines)
 
     def _may_have_gone(self, look: Look | None) -> bool:
         """Whether what is found may be what the target has stood before, which depth cannot say."""

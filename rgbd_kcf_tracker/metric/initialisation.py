@@ -193,9 +193,7 @@ def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
     """
     if _through_an_opening(scene, seen, box):
         return True
-    down, across = box.height / 4, box.width / 4
-    inner = Box(box.x + across, box.y + down, 2 * across, 2 * down).over(scene.view.step)
-    middle = part_in(scene.view.shape, inner)
+    middle = part_in(scene.view.shape, box.scaled(0.5).over(scene.view.step))
     depth = scene.view.depth[middle]
     own = np.count_nonzero(seen.in_view(scene.view.shape)[middle])
     if np.count_nonzero(depth == 0) > MOSTLY * depth.size:
@@ -317,8 +315,6 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     """
     part = rows, cols = part_in(scene.view.shape, box.over(scene.view.step))
     mine = scene.standing[part].copy()
-    if np.count_nonzero(mine) < SCATTERED * mine.size:
-        return None
     labels = scene.surfaces.labels[part]
     inside = np.bincount(labels[mine], minlength=len(scene.surfaces))
     inside[0] = scene.surfaces.pixels[0]  # pieces too small to be surfaces
@@ -409,9 +405,7 @@ def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
     """The part of a silhouette in the box that was drawn: what sticks out is something else."""
     grown = box.scaled(1 + 2 * OUTSIDE).over(scene.view.step)
     rows, cols = part_in(scene.view.shape, grown)
-    x0, x1 = max(seen.left, cols.start), min(seen.cols.stop, cols.stop)
-    y0, y1 = max(seen.top, rows.start), min(seen.rows.stop, rows.stop)
-    if (x0, x1, y0, y1) == (seen.left, seen.cols.stop, seen.top, seen.rows.stop):
+    part = seen.in_view(scene.view.shape)[rows, cols]
+    if np.count_nonzero(part) == np.count_nonzero(seen.mask):
         return seen
-    part = seen.mask[y0 - seen.top : y1 - seen.top, x0 - seen.left : x1 - seen.left]
-    return Silhouette.trimmed(scene.view, x0, y0, part, scene.rim) or seen
+    return Silhouette.trimmed(scene.view, cols.start, rows.start, part, scene.rim) or seen

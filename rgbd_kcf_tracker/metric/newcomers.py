@@ -129,7 +129,7 @@ class Newcomers:
             ):
                 continue
             # Somebody else may come in before the target: he has other colours.
-            colored = look.likely(scene.image[seen.rows, seen.cols], seen.mask)
+            colored = float(look.own(scene.image[seen.rows, seen.cols])[seen.mask].mean())
             likely = colored * shown.intersection(reach) / least
             if colored >= LIKELY and likely > likest:
                 best, likest = outline, likely

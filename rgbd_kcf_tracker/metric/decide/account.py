@@ -50,7 +50,7 @@ figure's area: more than half, so that it is never the same as two."""
 SAME_AGAIN = 0.5
 """Log-odds beyond those against coming back, and ahead of anybody else, at which somebody is one
 who was here before, by one sight or by several: a number given to a stranger is worse than one more
-number. With those against it they are seven to one, as for :data:`~.mix_ups.MIXED_UP`."""
+number. With those against it they are seven to one."""
 REUNION, PAUSE = 1.0, 3.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place; and
 the same where hardly a frame was taken meanwhile, as by a slow camera. Within a second a walker
@@ -198,8 +198,7 @@ class Account:
         for sight in self.sights:
             if sight.figure.seen.same(seen):
                 return sight.view
-        top = None if seen.cut.top else seen.highest(self.scene.elevation)
-        return look_of(self.scene, seen, top)
+        return look_of(self.scene, seen)
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``.
@@ -345,22 +344,18 @@ class Account:
         return mask
 
 
-def look_of(scene: Scene, seen: Silhouette, top: float | None) -> View:
+def look_of(scene: Scene, seen: Silhouette) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
     That is where the image ends below it, or depth does beside the upper end of what shows.
-
-    Args:
-        scene: the scene.
-        seen: the silhouette.
-        top: metres above the floor of its top, or None.
     """
-    above = 0.0
-    ends = scene.rim.reached(seen.left, seen.top, seen.cols.stop, seen.rows.stop, scene.view)
+    highest, above = seen.highest(scene.elevation), 0.0
+    top = None if seen.cut.top else highest
+    ends = seen.ends(scene.view, scene.rim)
     upper = seen.mask[:UPPER]
     beside = (ends.left and upper[:, 0].any()) or (ends.right and upper[:, -1].any())
     if ends.top or beside:
-        top, highest = None, seen.highest(scene.elevation)
+        top = None
         least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
         if highest is not None and least < highest < most:
             above = STATURE - highest

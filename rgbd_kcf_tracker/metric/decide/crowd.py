@@ -233,7 +233,7 @@ class Crowd:
                 opens(seen)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
-        sights = [Sight(f, look_of(scene, f.seen, f.top)) for f in figures]
+        sights = [Sight(f, look_of(scene, f.seen)) for f in figures]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
@@ -341,7 +341,7 @@ class Crowd:
                     continue
                 account.owner[column] = len(people)
                 newcomer = self.welcome(sight.figure.place, time)
-                newcomer.entered = sight.figure.seen.at_edge(account.scene.view, account.scene.rim)
+                newcomer.entered = sight.figure.seen.ends(account.scene.view, account.scene.rim).any
                 for other in people if account.scene.motion is None else ():
                     if other.seen_at < time and other.out_of_reach(newcomer.place, time):
                         other.meet(newcomer)

@@ -18,13 +18,11 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
+from rgbd_kcf_tracker.metric.perceive.figures import LEAST_PIXELS
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
 
-LEAST_PIXELS = 12
-"""Pixels of the view of a proposed surface, at the least: of fewer, three by four, neither outline
-nor colours tell anything."""
 LEAST_SHARE = 0.06
 """Area of a proposed surface against the target's, at the least: about a head against all of a
 person, which is what shows of somebody behind a cupboard."""

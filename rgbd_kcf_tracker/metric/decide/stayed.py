@@ -52,8 +52,7 @@ def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
         before = scene.before[seen.rows, seen.cols][seen.mask]
         if np.count_nonzero(before) >= MOST * len(before):
             continue  # seen as a figure anyway
-        top = None if seen.cut.top else seen.highest(scene.elevation)
-        view = look_of(scene, seen, top)
+        view = look_of(scene, seen)
         if any(p.gallery.log_odds(view) > LIKE for p in near):
             found.append(seen)
     return found

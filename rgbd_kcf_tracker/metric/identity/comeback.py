@@ -20,8 +20,8 @@ from rgbd_kcf_tracker.metric.identity.tally import Tally
 
 BORNE_OUT = 2.0
 """Log-odds (seven to one) from which what was learned since the return is of the target and stays,
-as much as it takes to say the contrary
-(:data:`~rgbd_kcf_tracker.metric.decide.mix_ups.MIXED_UP`)."""
+as much as it takes to give an old number to a newcomer
+(:data:`~rgbd_kcf_tracker.metric.decide.account.SAME_AGAIN`)."""
 EVEN = 0.5
 """Probability below which who came back is rather somebody else than the target: no box is shown of
 him, and what was learned of him does not stay."""

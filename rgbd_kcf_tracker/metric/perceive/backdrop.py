@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import (
+    CREPT,
     LEAST_CORNERS,
     changed,
     corners_between,
@@ -45,10 +46,10 @@ SETTLED = 1.0
 """Seconds without a change after which what differs is the backdrop although no outline tells the
 target from it: it was taken for the backdrop while something passed. Of who walks, no clothes stay
 where they are for so long."""
-CREPT, CREEPS = 0.3, 2.0
-"""Seconds after which it is asked whether the camera has crept, and pixels by which it has at the
-most: from one picture to the next it moves by a part of a pixel then, and some pictures later every
-edge differs from the backdrop. What has moved by more is somebody who passes."""
+CREEPS = 2.0
+"""Pixels by which the camera has crept in :data:`CREPT` at the most: from one picture to the next
+it moves by a part of a pixel then, and some pictures later every edge differs from the backdrop.
+What has moved by more is somebody who passes."""
 MARGIN = 1.15
 """Sides of the box, in units of the target's, inside which nothing is learned unless its outline is
 known: an arm or a foot sticks out by so much."""
@@ -197,9 +198,8 @@ class Backdrop:
         Returns:
             None where nothing moves there, or two have met who cannot be told apart.
         """
-        part = self._within_picture(
-            Box.from_center(box.cx, box.cy, box.width + ASIDE * box.height, HIGH * box.height)
-        )
+        width, height = box.width + ASIDE * box.height, HIGH * box.height
+        part = part_in(self._last.shape, Box.from_center(box.cx, box.cy, width, height))
         known, differs = self._known[part], self._differs[part]
         rows, cols = part
         b = box.moved(-cols.start, -rows.start)
@@ -307,12 +307,9 @@ class Backdrop:
         self._known |= still
         return mine
 
-    def _within_picture(self, box: Box) -> tuple[slice, slice]:
-        return part_in(self._last.shape, box)
-
     def _within(self, box: Box) -> Mask:
         mask = np.zeros(self._last.shape[:2], np.bool_)
-        mask[self._within_picture(box)] = True
+        mask[part_in(self._last.shape, box)] = True
         return mask
 
     def _camera_moved(self, gray: Image, outside: Mask) -> bool:

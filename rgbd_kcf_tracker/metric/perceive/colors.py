@@ -58,24 +58,17 @@ _LUMA = np.array([0.114, 0.587, 0.299])
 """Shares of blue, green and red in lightness, which are OpenCV's (ITU-R BT.601)."""
 
 
-def view_image(
-    color: npt.NDArray[np.uint8], step: int, shape: tuple[int, int]
-) -> npt.NDArray[np.uint8]:
+def view_image(color: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uint8]:
     """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image, each from the middle of a step.
 
     Args:
         color: the image.
         step: as of the :class:`~rgbd_kcf_tracker.metric.perceive.depth_view.DepthView`.
-        shape: rows and columns of the result.
-
-    Returns:
-        ``shape + (3,)`` uint8.
     """
-    rows, cols = shape
     # The exact nearest neighbours of OpenCV 4.6 are others at even steps.
     first = step // 2
-    taken = color[first::step, first::step][:rows, :cols]
-    image = np.empty((rows, cols, 3), np.uint8)
+    taken = color[first::step, first::step]
+    image = np.empty(taken.shape, np.uint8)
     for channel in range(3):  # a third of the time of three bytes at once
         image[..., channel] = taken[..., channel]
     return image

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -104,19 +104,13 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        parts = parted(
-            scene.view,
-            scene.forward,
-            scene.axes[0],
-            part[1].start + left,
-            part[0].start + top,
-            member[crop],
-            expected,
-        )
-        for part_left, part_top, silhouette in parts:
-            figure = _figure(scene, part_left, part_top, silhouette, len(parts) > 1)
-            if figure is not None:
-                found.append(figure)
+        left, top = part[1].start + left, part[0].start + top
+        parts = parted(scene.view, scene.forward, scene.axes[0], left, top, member[crop], expected)
+        for each in parts:
+            seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
+            if seen is not None and makes_figure(scene, seen):
+                highest = None if seen.cut.top else seen.highest(scene.elevation)
+                found.append(Figure(seen, highest, place_of(scene, seen), len(parts) > 1))
     return found
 
 
@@ -180,14 +174,6 @@ def _joined(
         for group, extent in zip(groups, extents, strict=True)
         if extent[5] > LEAST_AREA
     ]
-
-
-def _figure(scene: Scene, left: int, top: int, mask: Mask, parted: bool) -> Figure | None:
-    seen = Silhouette.of(scene.view, left, top, mask, 0, scene.rim)
-    if not makes_figure(scene, seen):
-        return None
-    highest = None if seen.cut.top else seen.highest(scene.elevation)
-    return Figure(seen, highest, place_of(scene, seen), parted)
 
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:

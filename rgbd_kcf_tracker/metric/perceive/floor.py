@@ -73,7 +73,7 @@ class Floor:
     b: float
     c: float
     height: float
-    tilt: float = 0.0
+    tilt: float
 
     def elevation(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         """Metres above the floor of each pixel, ``(h, w)`` float32; ``height`` where depth is 0."""
@@ -101,12 +101,13 @@ class Floor:
         return ahead
 
     @classmethod
-    def through(cls, plane: FloatArray, k: Intrinsics) -> Floor:
-        """The floor ``plane @ p = 1``, ``(3,)`` in the camera's frame, as a view shows it."""
-        x, y, z = plane.tolist()
-        a, b = x / k.fx, y / k.fy
-        height = 1 / math.sqrt(x * x + y * y + z * z)
-        return cls(a, b, z - a * k.cx - b * k.cy, height, z * height)
+    def of(cls, plane: FloatArray, k: Intrinsics) -> Floor | None:
+        """The floor with ``a, b, c``, ``(3,)``; None where none can be there."""
+        height = float(_heights(plane[None], k)[0])
+        if math.isnan(height):
+            return None
+        a, b, c = plane.tolist()
+        return cls(a, b, c, height, (c + a * k.cx + b * k.cy) * height)
 
     def plane(self, k: Intrinsics) -> FloatArray:
         """The numbers ``(3,)`` with which ``plane @ p = 1`` on the floor, in the camera's frame."""
@@ -123,9 +124,9 @@ class Floor:
         above = float(1 + turned @ motion.translation)  # in camera heights
         if above <= 0:
             return None
-        floor = self.through(turned / above, k)
-        heights = _heights(np.array([[floor.a, floor.b, floor.c]]), k)
-        return None if math.isnan(heights[0]) else floor
+        x, y, z = (turned / above).tolist()
+        a, b = x / k.fx, y / k.fy
+        return self.of(np.array([a, b, z - a * k.cx - b * k.cy]), k)
 
     def axes(self, k: Intrinsics) -> FloatArray:
         """Unit vectors along the floor, ``(2, 3)`` in the camera's frame: to the right, and ahead.
@@ -274,11 +275,7 @@ class FloorFinder:
             # Weighted by depth, so that the fit is in metres rather than in inverse metres.
             a = rays[on]
             plane = np.linalg.solve(a.T @ a + 1e-9 * np.eye(3), a.sum(axis=0))
-        height = float(_heights(plane[None], k)[0])
-        if math.isnan(height):
-            return None
-        a, b, c = plane.tolist()
-        return Floor(a, b, c, height, (c + a * k.cx + b * k.cy) * height)
+        return Floor.of(plane, k)
 
 
 def _inverse(view: DepthView, first: int, end: int) -> npt.NDArray[np.float32]:

@@ -53,8 +53,8 @@ def parted(
     top: int,
     mask: Mask,
     expected: FloatArray = NOBODY,
-) -> list[tuple[int, int, Mask]]:
-    """A mask, or the masks of the people that it is made of, each with its corner.
+) -> list[Mask]:
+    """A mask, or the masks of the people that it is made of, with the same corner.
 
     Args:
         view: the depth.
@@ -72,8 +72,6 @@ def parted(
     z = float(depth[mask].mean())
     narrow = cols * z / k.fx < BROAD
     far = _farther(mask, ahead, z / k.fy)
-    if narrow and len(expected) < 2 and far is None:
-        return [(left, top, mask)]
     columns = np.arange(left, left + cols) - k.cx
     lines = np.arange(top, top + rows) - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.
@@ -91,7 +89,7 @@ def parted(
     if len(seeds) < 2 and not narrow:
         seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
     if len(seeds) < 2 and far is None:
-        return [(left, top, mask)]
+        return [mask]
     v, u_ = np.nonzero(mask)
     reach = np.array([REACH_ACROSS, REACH_DEEP])
     across = (columns[u_] * x_of + lines[v] * y_of) * depth[v, u_]
@@ -110,24 +108,19 @@ def parted(
         if not keep.all():
             seeds = seeds[keep]
             if len(seeds) < 2:
-                return [(left, top, mask)]
+                return [mask]
             continue
         sums = [np.bincount(owner, some[:, axis]) for axis in (0, 1)]
         seeds = np.stack(sums, axis=1) / count[:, None]
     apart = np.hypot(*((seeds[:, None] - seeds[None]) * reach).transpose(2, 0, 1))
     if (apart[np.triu_indices(len(seeds), 1)] < APART).any():
-        return [(left, top, mask)]
+        return [mask]
     owner = _nearest(points, seeds)
     parts = []
     for index in range(len(seeds)):
         part = np.zeros_like(mask)
-        mine = owner == index
-        if not mine.any():
-            continue
-        part[v[mine], u_[mine]] = True
-        y0, x0 = int(v[mine].min()), int(u_[mine].min())
-        y1, x1 = int(v[mine].max()) + 1, int(u_[mine].max()) + 1
-        parts.append((left + x0, top + y0, part[y0:y1, x0:x1]))
+        part[mask] = owner == index
+        parts.append(part)
     return parts
 
 

@@ -98,14 +98,11 @@ def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
     seen[place[order]] = ahead[order]
     seen = seen.reshape(rows, cols)
     # Where the view is spread, single pixels stay empty between two of the same surface.
-    beside = cv2.dilate(seen, np.ones((1, 3), np.uint8))
-    hole = (seen == 0) & (np.roll(seen, 1, 1) > 0) & (np.roll(seen, -1, 1) > 0)
-    hole[:, (0, -1)] = False
-    seen[hole] = beside[hole]
-    beside = cv2.dilate(seen, np.ones((3, 1), np.uint8))
-    hole = (seen == 0) & (np.roll(seen, 1, 0) > 0) & (np.roll(seen, -1, 0) > 0)
-    hole[(0, -1), :] = False
-    seen[hole] = beside[hole]
+    for axis, side, ends in ((1, (1, 3), np.s_[:, (0, -1)]), (0, (3, 1), np.s_[(0, -1), :])):
+        beside = cv2.dilate(seen, np.ones(side, np.uint8))
+        hole = (seen == 0) & (np.roll(seen, 1, axis) > 0) & (np.roll(seen, -1, axis) > 0)
+        hole[ends] = False
+        seen[hole] = beside[hole]
     return seen
 
 
@@ -171,19 +168,8 @@ class Room:
     """
 
     def __init__(self) -> None:
-        self.depth: DepthArray = np.zeros((0, 0), np.float32)
-        self.before: Mask = np.zeros((0, 0), np.bool_)
-        self.still: Mask = self.before
-        self.vacant: Mask = self.before
-        self._farther: DepthArray = self.depth
-        self._front: DepthArray = self.depth
-        self._stood, self._stood_at = self.depth, self.depth
-        self._time = 0.0
-        self._blind: npt.NDArray[np.uint8] = np.zeros((0, 0), np.uint8)
-        self._still: DepthArray = self.depth
-        self._still_for: DepthArray = self.depth
+        self.restart(np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_))
         self._unlearned = 0.0
-        self._has_moved = False
 
     def restart(self, depth: DepthArray, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -266,7 +252,6 @@ class Room:
         self._farther = _seen_from(self._farther, motion, k)
         self._still_for = np.zeros_like(self.depth)
         self._stood = np.zeros_like(self.depth)
-        self._has_moved = True
         self.vacant = ~unknown
         lost: Mask = unknown & ~opened
         return lost
@@ -358,7 +343,6 @@ class Room:
                 None for none.
         """
         self._time += dt
-        has_moved, self._has_moved = self._has_moved, False
         valid = depth > 0
         known = self.depth > 0
         allowed = tolerance(depth)
@@ -376,7 +360,6 @@ class Room:
         new &= ~before
         if undecided is not None:
             new &= ~undecided
-        if has_moved:
             # A reading unlike all about it is noise, and would hide what is behind it from then on.
             new &= np.abs(depth - cv2.medianBlur(depth, 3)) <= allowed
         np.copyto(self.depth, depth, where=new)

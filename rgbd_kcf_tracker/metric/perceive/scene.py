@@ -135,7 +135,6 @@ class SceneReader:
         self._floors = FloorFinder()
         self._level: Floor | None = None
         self._rim: Rim | None = None
-        self._shape: tuple[int, int] = (0, 0)
         self._begun = False
         self._light = Light()
         self._ego = EgoMotion()
@@ -158,11 +157,10 @@ class SceneReader:
         # To what depth shows the frames without it are a pause.
         seconds, self._unread = self._unread, 0.0
         self.last_view = view
-        if view.shape != self._shape:
-            self._rim, self._shape = None, view.shape
-            self._floors, self._level = FloorFinder(), None
+        if view.shape != self.room.depth.shape:
+            self._rim, self._floors, self._level = None, FloorFinder(), None
         learns, since = self._due(seconds)
-        image = view_image(frame.color, view.step, view.shape)
+        image = view_image(frame.color, view.step)
         motion = way = self._move(image, view, frame.pose, seconds)
         if isinstance(way, Lost) and self.room.agrees(view.depth):
             motion, way = None, way if way.surely else None

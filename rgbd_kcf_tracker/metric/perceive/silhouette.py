@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import or_
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -29,8 +31,7 @@ UPPER = 0.98
 _SEAM = np.ones((3, 3), np.uint8)
 
 
-@dataclass(frozen=True, slots=True)
-class Rim:
+class Rim(NamedTuple):
     """Columns and rows at the edges of a view in which there never is a reading.
 
     A registered depth image often covers less than the colour image.
@@ -58,12 +59,7 @@ class Rim:
 
     def common(self, other: Rim) -> Rim:
         """What is rim in both: holes come and go, the rim stays."""
-        return Rim(
-            min(self.left, other.left),
-            min(self.top, other.top),
-            min(self.right, other.right),
-            min(self.bottom, other.bottom),
-        )
+        return Rim(*map(min, self, other))
 
     def reached(
         self, left: float, top: float, right: float, bottom: float, view: DepthView
@@ -78,19 +74,18 @@ class Rim:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Sides:
+class Sides(NamedTuple):
     """Something for each side of a silhouette."""
 
-    left: bool
-    top: bool
-    right: bool
-    bottom: bool
+    left: bool = False
+    top: bool = False
+    right: bool = False
+    bottom: bool = False
 
     @property
     def any(self) -> bool:
         """True where it holds for one side at least."""
-        return self.left or self.top or self.right or self.bottom
+        return True in self
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,20 +111,15 @@ class Silhouette:
     cut: Sides
     metres: tuple[float, float, float, float]
 
-    def at_edge(self, view: DepthView, rim: Rim) -> bool:
-        """True where it reaches the end of what the camera sees."""
-        return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view).any
+    def ends(self, view: DepthView, rim: Rim) -> Sides:
+        """At which sides it reaches the end of what the camera sees."""
+        return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
 
     def in_view(self, shape: tuple[int, int]) -> Mask:
         """Its pixels in a view of a shape, ``(h, w)`` bool."""
         mask = np.zeros(shape, np.bool_)
         mask[self.rows, self.cols] = self.mask
         return mask
-
-    def at_side(self, view: DepthView, rim: Rim) -> bool:
-        """True where it reaches the end of what the camera sees to the left or to the right."""
-        ends = rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
-        return ends.left or ends.right
 
     def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
@@ -209,14 +199,8 @@ class Silhouette:
         depth = view.depth[top : top + rows, left : left + cols]
         z = float(depth[mask].mean())
         k = view.intrinsics
-        hidden = _hidden_sides(view, left, top, mask, z)
         ends = rim.reached(left, top, left + cols, top + rows, view)
-        cut = Sides(
-            hidden.left or ends.left,
-            hidden.top or ends.top,
-            hidden.right or ends.right,
-            hidden.bottom or ends.bottom,
-        )
+        cut = Sides(*map(or_, _hidden_sides(view, left, top, mask, z), ends))
         x0, y0, _ = view.metres(left, top, z)
         x1, y1, _ = view.metres(left + cols, top + rows, z)
         area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
@@ -266,7 +250,7 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     nearer = around < z - (NEARER + NEARER_PER_METRE * z)
     nearer &= around > 0
     if not nearer.any():
-        return Sides(False, False, False, False)
+        return Sides()
     body = np.zeros(nearer.shape, np.bool_)
     body[top - y0 : top - y0 + rows, left - x0 : left - x0 + cols] = mask
     outside = ~body

@@ -200,14 +200,16 @@ def upright_people(
             found = [single] if upright(single, k, single.highest(elevation)) else []
         if not found and several[label]:
             parts = parted(view, forward, right, left, upper, mask)
-            cut = [Silhouette.of(view, *part, 0, rim) for part in parts if len(parts) > 1]
+            cut = [Silhouette.trimmed(view, left, upper, part, rim) for part in parts]
             found = [
                 part
                 for part in cut
+                if len(parts) > 1 and part is not None
                 if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
         for seen in found:
-            if whole and seen.at_side(view, rim):
+            ends = seen.ends(view, rim)
+            if whole and (ends.left or ends.right):
                 continue
             people[seen.rows, seen.cols] |= seen.mask
             if one[label] and seen.height >= LENGTH[0]:
