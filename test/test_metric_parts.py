@@ -103,7 +103,7 @@ def test_the_share_of_a_surface_that_is_others_is_that_of_its_pixels():
     assert len(scene.surfaces) > 5
     for label in range(1, len(scene.surfaces)):
         share = theirs[labels == label].mean()
-        assert others.share_of_surface(label) == pytest.approx(share)
+        assert others.share(scene.silhouette(label)) == pytest.approx(share)
 
 
 def test_view_takes_every_step_and_fills_single_holes():
@@ -672,6 +672,33 @@ def test_nothing_is_learned_of_what_is_refused_and_it_is_not_found_again_until_i
     assert found is not None
     assert found.box.iou(box) > 0.9
     assert found.ratio == pytest.approx(before.ratio, rel=0.05)
+
+
+def test_what_was_refused_is_not_where_the_target_is_sought_from_then_on(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """It was sought about the stranger that depth had told from it, and not where it was lost."""
+    patch = blobs(20, 60)
+
+    def at(i: int, x: int) -> Frame:
+        image = np.full((300, 300, 3), 90, np.uint8)
+        image[130:190, x : x + 60] = patch
+        return Frame(image, None, i * 100_000_000)
+
+    look = ByLook(at(0, 130), Box(130, 130, 60, 60), MetricParameters())
+    found = look.step(at(1, 155), 0.1)
+    assert found is not None
+    assert found.box.x == pytest.approx(155, abs=3)
+    look.refuse(at(1, 155), found)
+    asked, look_at = [], ByLook._look_at
+
+    def watched(self: ByLook, frame: Frame, small: np.ndarray, cx: float, cy: float):
+        asked.append((cx, cy))
+        return look_at(self, frame, small, cx, cy)
+
+    monkeypatch.setattr(ByLook, '_look_at', watched)
+    look.step(at(2, 155), 0.1)
+    assert asked[0] == (160, 160)
 
 
 def test_who_asks_for_colours_gets_what_was_put_off_as_well():

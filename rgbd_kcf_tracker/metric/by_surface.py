@@ -167,7 +167,7 @@ class BySurface:
             self._cloud.weigh(dt, scene.view, PLACED_MIDDLE * self.body.height)
         expected = self.expected(dt)
         missing = self.expected_body.visible(scene) > 0.6
-        others = account.others(self.person)
+        others = account.others(self.person, self._parameters.use_room)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
         # Where his own figure is known, what holds somebody else besides is no proposal.
         most = STANDING if self.person not in account.owners else MIXED

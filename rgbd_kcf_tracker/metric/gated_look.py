@@ -201,13 +201,13 @@ class GatedLook:
         # Where depth does not show it either, a look that has become unlike is something else;
         # but depth says nothing of what has no reading.
         silent = look.depth is None and self._look.last_depth is None
-        unlike = look.ratio < self._seen_ratio and not silent
-        unlike = unlike and not (self._goes_on(account, look) or self._stands_there(account, look))
+        changed = look.ratio < self._seen_ratio and not silent
+        changed &= not (self._goes_on(account, look) or self._stands_there(account, look))
         still = self.stood is not None and self.stood.known
         if still and self._look.still_there(frame, look.box) is False:
             return True
         reasons = (self._stands, self._taken, self._far, self._stood_elsewhere, self._unlike)
-        return unlike or any(refused(account, look) for refused in reasons)
+        return changed or any(refused(account, look) for refused in reasons)
 
     def _goes_on(self, account: Account, look: Look) -> bool:
         """Whether depth shows something as near as the target was a frame ago, before the room."""

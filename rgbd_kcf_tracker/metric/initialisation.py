@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_step
 from rgbd_kcf_tracker.metric.perceive.parting import BEHIND, BROAD
-from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
 
@@ -199,7 +199,7 @@ def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
     if np.count_nonzero(depth == 0) > MOSTLY * depth.size:
         return bool(own < CENTRED * np.count_nonzero(seen.mask))
     nearer = scene.standing[middle] & (depth < seen.depth - DEPTH_STEP)
-    nearer &= larger_than_anybody(scene.sizes)[scene.surfaces.labels[middle]]
+    nearer &= scene.large[scene.surfaces.labels[middle]]
     return bool(np.count_nonzero(nearer) > own)
 
 
@@ -243,7 +243,7 @@ def _one_of_two(scene: Scene, piece: Silhouette, box: Box) -> bool:
     part = part_in(scene.view.shape, box.over(scene.view.step))
     labels = scene.surfaces.labels[part]
     farther = scene.view.depth[part] > piece.depth + DEPTH_STEP
-    farther &= (labels > 0) & ~larger_than_anybody(scene.sizes)[labels] & ~own[part]
+    farther &= (labels > 0) & ~scene.large[labels] & ~own[part]
     return bool(np.count_nonzero(farther) < SOMEBODY_FARTHER * farther.size)
 
 
@@ -287,7 +287,7 @@ def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
 
 def _largest_shown(scene: Scene, shown: npt.NDArray[np.intp]) -> int:
     """How many pixels a box shows of what it shows most of, and what is no larger than a person."""
-    small = ~larger_than_anybody(scene.sizes)
+    small = ~scene.large
     small[0] = False
     return int(shown[small].max(initial=0))
 
@@ -330,18 +330,8 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     most = _largest_shown(scene, _shown(scene, box))
     if np.count_nonzero(mine) < max(SCATTERED * mine.size, LEAST_BESIDE * most):
         return None
-    # Where the middle of the box shows something nearer, they are of what is behind the target.
-    nearer = scene.standing[part] & (depth < (nearest - 0.5) * THICK)
-    down, across = mine.shape[0] // 4, mine.shape[1] // 4
-    middle = np.s_[down : mine.shape[0] - down, across : mine.shape[1] - across]
-    own = np.count_nonzero(mine[middle])
-    if np.count_nonzero(nearer[middle]) > own:
-        return None
-    # So they are where the middle shows nothing: of the target, then, there is no reading at all.
-    if own < CENTRED * np.count_nonzero(mine):
-        return None
     seen = Silhouette.trimmed(scene.view, cols.start, rows.start, mine, scene.rim)
-    if seen is None or _through_an_opening(scene, seen, box):
+    if seen is None or _of_background(scene, seen, box):
         return None
     # What little depth there is of a small thing in a hand may be the hand's.
     if seen.width * seen.height < SMALL or box_about(scene, seen).iou(box) < LOCK_IOU:
@@ -391,7 +381,7 @@ def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
     own = seen.in_view(scene.view.shape)[middle]
     depth, labels = scene.view.depth[middle], scene.surfaces.labels[middle]
     beyond = depth > seen.depth + DEPTH_STEP
-    room = larger_than_anybody(scene.sizes)[labels] & beyond | ~scene.standing[middle] & (depth > 0)
+    room = scene.large[labels] & beyond | ~scene.standing[middle] & (depth > 0)
     aside = _overlaps_of(scene, box) < AS_WELL * box_about(scene, seen).iou(box)
     aside[0] = False
     farther = ~own & ~room & beyond

@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
-from rgbd_kcf_tracker.metric.perceive.scene import SceneReader, larger_than_anybody
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.surfaces import standing, surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import upright
 
@@ -87,7 +87,7 @@ def _person_at(frame: Frame, u: float, v: float) -> Box | None:
     at = slice(row, row + 1), slice(column, column + 1)
     near = slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2)
     # Whoever points beside an outline means it, if the room is all that is there.
-    large = larger_than_anybody(scene.sizes)[scene.surfaces.labels[at]]
+    large = scene.large[scene.surfaces.labels[at]]
     where = near if (large | ~scene.standing[at]).all() else at
     for figure in find_figures(scene, np.zeros((0, 2))):
         shows = figure.seen.in_view(scene.view.shape)[where].any()
@@ -100,7 +100,7 @@ def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
     """The box round the connected surface at a pixel; raises as :func:`target_at`."""
     # The view's pixels are those in the middle of each step.
     half = view.step // 2
-    row, column = _nearest(view.depth > 0, (v - half) / view.step, (u - half) / view.step, NEAREST)
+    row, column = _nearest(view.depth > 0, (v - half) / view.step, (u - half) / view.step)
     if row < 0:
         raise BoxError(f'there is no depth reading near point {u:g},{v:g}: point elsewhere')
     depth = float(view.depth[row, column])
@@ -138,7 +138,7 @@ def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
 def _connected(view: DepthView, mask: npt.NDArray[np.bool_], row: int, column: int) -> Box | None:
     """Box in the colour image of the part of ``mask`` that is connected to a pixel of the view."""
     surfaces = surfaces_in(view.depth, mask, JUMP_M, JUMP_SHARE)
-    row, column = _nearest(surfaces.labels > 0, row, column, NEAREST)
+    row, column = _nearest(surfaces.labels > 0, row, column)
     label = int(surfaces.labels[row, column]) if row >= 0 else 0
     if label == 0 or surfaces.pixels[label] < LEAST_PIXELS:
         return None
@@ -157,13 +157,11 @@ def _level(view: DepthView, elevation: npt.NDArray[np.float32] | None) -> npt.ND
     return level
 
 
-def _nearest(
-    mask: npt.NDArray[np.bool_], row: float, column: float, reach: float
-) -> tuple[int, int]:
+def _nearest(mask: npt.NDArray[np.bool_], row: float, column: float) -> tuple[int, int]:
     """Row and column of the set pixel nearest to a place, (-1, -1) where none is near."""
-    reach_pixels = max(math.ceil(reach * mask.shape[1]), 1)
-    top, left = max(int(row) - reach_pixels, 0), max(int(column) - reach_pixels, 0)
-    part = mask[top : int(row) + reach_pixels + 1, left : int(column) + reach_pixels + 1]
+    reach = max(math.ceil(NEAREST * mask.shape[1]), 1)
+    top, left = max(int(row) - reach, 0), max(int(column) - reach, 0)
+    part = mask[top : int(row) + reach + 1, left : int(column) + reach + 1]
     rows, columns = np.nonzero(part)
     if not len(rows):
         return -1, -1

@@ -284,16 +284,20 @@ class Account:
         mine = seen.in_view(depth.shape)[there] & (np.abs(depth[there] - last.depth) < step)
         return share * (1.0 - np.count_nonzero(mine) / np.count_nonzero(seen.mask))
 
-    def others(self, person: Person) -> Others:
+    def others(self, person: Person, room: bool = True) -> Others:
         """The pixels that are surely not a person's.
 
         They belong to somebody who was seen beside him, or are the room where he is no part of it.
+
+        Args:
+            person: he.
+            room: whether the room counts.
         """
         met = [
             owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
             for owner in self.owner
         ]
-        return Others(self.parts, [False, person.mobile, *met])
+        return Others(self.parts, [False, room and person.mobile, *met])
 
     def stranger(self, person: Person, index: int) -> Person | None:
         """Who a sight is taken for, if that may be ``person`` under another number.

@@ -64,7 +64,7 @@ class Evidence:
         assigned: by the joint explanation of the frame, 1 where its figure is the target, -1 where
             it is somebody else, 0 where it is somebody new or no figure; 1 for a target that is no
             figure itself.
-        room: share of its pixels that stood still before, for a target that has walked.
+        room: share of its pixels that stood still while the target was elsewhere.
         more: what further cues say.
     """
 

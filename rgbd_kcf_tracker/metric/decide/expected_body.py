@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 
 
@@ -40,8 +40,8 @@ class ExpectedBody:
         if self.position[2] < 0.3:
             return np.zeros((0, 0), np.float32), 1.0
         left, top, right, bottom = self.sides(scene.view)
-        total = max(1.0, (right - left + 1) * (bottom - top + 1))
-        return scene.view.depth[scene.view.part(left, top, right, bottom)], total
+        shown = Box.from_corners(left, top, right, bottom)
+        return scene.view.depth[part_in(scene.view.shape, shown)], max(1.0, shown.area)
 
     def visible(self, scene: Scene) -> float:
         """Share of it that nothing nearer, no hole and no image edge hides."""

@@ -35,7 +35,6 @@ class Parts:
     """
 
     def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
-        self.surfaces = scene.surfaces
         self.kinds: Kinds = scene.still.astype(np.uint16)
         self.length = FIRST + len(figures)
         for kind, seen in enumerate(figures, FIRST):
@@ -76,11 +75,3 @@ class Others:
         """Share of a silhouette's pixels, 0 to 1."""
         counts = self.parts.counts(seen)
         return sum(compress(counts, self.theirs)) / sum(counts)
-
-    def share_of_surface(self, label: int) -> float:
-        """Share of one surface's pixels, 0 to 1."""
-        surfaces = self.parts.surfaces
-        left, top, width, height = surfaces.boxes[label].tolist()
-        part = slice(top, top + height), slice(left, left + width)
-        kinds = self.parts.kinds[part][surfaces.labels[part] == label]
-        return sum(compress(self.parts.counted(kinds), self.theirs)) / max(len(kinds), 1)

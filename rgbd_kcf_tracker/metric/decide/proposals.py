@@ -16,8 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
+from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_PIXELS
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -96,16 +98,17 @@ def _split(
     mixed = (sizes.area > body.area) & ~large
     mixed[0] = False
     for label in np.flatnonzero(mixed).tolist():
-        large[label] = others.share_of_surface(label) > MIXED
+        large[label] = others.share(scene.silhouette(label)) > MIXED
     large[0] = False
     if not large.any():
         return []
     beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
     above = min(2 * expected.sigma[1] + 0.15, 0.5)
-    part = view.part(
+    reach = Box.from_corners(
         *view.place(x - beside, y - above, z),
         *view.place(x + beside, y + body.height + above, z),
     )
+    part = part_in(view.shape, reach)
     depth = view.depth[part]
     if min(depth.shape) < 3:
         return []
@@ -118,12 +121,10 @@ def _split(
         depth, mask, 0.5 * scene.surfaces.jump, 0.5 * scene.surfaces.jump_per_metre
     )
     found = []
-    for i in range(1, len(pieces)):
-        area = pieces.pixels[i] * float(pieces.depth[i]) ** 2 / (k.fx * k.fy)
-        if pieces.pixels[i] < LEAST_PIXELS or area < 0.1 * body.area:
-            continue
-        u, v, w, h = (int(t) for t in pieces.boxes[i])
-        piece = pieces.labels[v : v + h, u : u + w] == i
+    enough = (pieces.pixels >= LEAST_PIXELS) & (pieces.areas(k) >= 0.1 * body.area)
+    enough[0] = False
+    for label in np.flatnonzero(enough).tolist():
+        u, v, piece = pieces.crop(label)
         left, top = part[1].start + u, part[0].start + v
         found.append(Silhouette.of(view, left, top, piece, 0, scene.rim))
     return found
@@ -186,7 +187,7 @@ def gathered(
     inside[0] = False
     inside[seen.label] = False
     for label in np.flatnonzero(inside).tolist():
-        inside[label] = others.share_of_surface(label) < 0.5
+        inside[label] = others.share(scene.silhouette(label)) < 0.5
     more = boxes[inside]
     if not len(more):
         return None

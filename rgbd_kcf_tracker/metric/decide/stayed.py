@@ -15,11 +15,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rgbd_kcf_tracker.metric.decide.account import look_of
+from rgbd_kcf_tracker.metric.decide.account import MOST, look_of
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_AREA
-from rgbd_kcf_tracker.metric.perceive.room import MOST, SETTLE
-from rgbd_kcf_tracker.metric.perceive.scene import Scene, larger_than_anybody
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 THERE = 0.5
@@ -41,7 +41,7 @@ def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
         return []
     sizes, surfaces = scene.sizes, scene.surfaces
     places = (scene.axes @ np.stack((sizes.x, sizes.y, surfaces.depth))).T
-    possible = (sizes.area > LEAST_AREA) & ~larger_than_anybody(sizes)
+    possible = (sizes.area > LEAST_AREA) & ~scene.large
     possible[0] = False
     found = []
     for label in np.flatnonzero(possible).tolist():

@@ -93,14 +93,6 @@ class DepthView:
             return self
         return DepthView(np.zeros((rows, cols), np.float32), step, intrinsics)
 
-    def part(self, left: float, top: float, right: float, bottom: float) -> tuple[slice, slice]:
-        """Rows and columns of what lies between these places, as far as they are in the view."""
-        rows, cols = self.shape
-        return (
-            slice(int(min(max(top, 0), rows)), int(min(max(bottom + 1, 0), rows))),
-            slice(int(min(max(left, 0), cols)), int(min(max(right + 1, 0), cols))),
-        )
-
     def metres(self, across: float, down: float, depth: float) -> tuple[float, float, float]:
         """Where a place of the view is, in metres of the camera's frame.
 

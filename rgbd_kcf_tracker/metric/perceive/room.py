@@ -44,7 +44,7 @@ AGREEING = 0.5
 that has readings from which a view tells what has none any more."""
 MOST = 0.5
 """Share of where a part of a surface that was hidden meets what is known, along which it goes on as
-the room, from which that part is room, too."""
+the room, from which that part is room, too; and of somebody's pixels, from which they are his."""
 GOES_ON = 0.25
 """Share of a surface that must be known to stand before the room, and no less of it than is room,
 for the rest of it to be somebody too."""

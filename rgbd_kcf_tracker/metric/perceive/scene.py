@@ -94,6 +94,11 @@ class Scene:
         """Places and sizes of the surfaces."""
         return Sizes.of(self.surfaces, self.view.intrinsics)
 
+    @cached_property
+    def large(self) -> npt.NDArray[np.bool_]:
+        """For each surface whether it is larger than anybody."""
+        return larger_than_anybody(self.sizes)
+
     def ends(self, box: Box) -> Sides:
         """The sides at which a box of the image reaches the end of what depth sees."""
         b = box.over(self.view.step)
@@ -103,8 +108,7 @@ class Scene:
         """One surface as a silhouette; the same for whoever asks."""
         seen = self._silhouettes.get(label)
         if seen is None:
-            left, top, width, height = self.surfaces.boxes[label].tolist()
-            mask = self.surfaces.labels[top : top + height, left : left + width] == label
+            left, top, mask = self.surfaces.crop(label)
             seen = Silhouette.of(self.view, left, top, mask, label, self.rim)
             self._silhouettes[label] = seen
         return seen
@@ -119,6 +123,8 @@ class SceneReader:
             still without becoming part of the room; to be set by who decides. None for nobody.
         last_view: the depth of the last frame that had any.
         stood_for: seconds for which the camera has stood still, 0 while it moves.
+        seems: how the camera seems to have moved to the last frame, by the picture: the pose of the
+            frame before in that of now; None where nothing tells of a motion.
 
     Args:
         width: columns of the view.
@@ -302,9 +308,7 @@ class SceneReader:
             scene: the scene.
         """
         mask = seen.in_view(scene.view.shape)
-        return self.room.goes_on(
-            mask, scene.view.depth, scene.surfaces, larger_than_anybody(scene.sizes)
-        )
+        return self.room.goes_on(mask, scene.view.depth, scene.surfaces, scene.large)
 
     def _move(
         self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None, seconds: float

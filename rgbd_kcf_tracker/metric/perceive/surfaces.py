@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
@@ -66,6 +67,11 @@ class Surfaces:
         z = self.depth.astype(np.float64)
         result: npt.NDArray[np.float64] = self.pixels * z * z / (k.fx * k.fy)
         return result
+
+    def crop(self, label: int) -> tuple[int, int, Mask]:
+        """Left and top of one surface, and which pixels right and below of there are of it."""
+        left, top, width, height = self.boxes[label].tolist()
+        return left, top, self.labels[top : top + height, left : left + width] == label
 
     def means(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         """Mean over each surface of an image, ``(h, w)``; ``(n,)``, 0 where there is no pixel."""

@@ -151,8 +151,8 @@ class UprightPeople:
 
     Attributes:
         mask: ``(h, w)`` bool, of all.
-        tall: ``(h, w)`` bool, of those alone who are a surface of their own, as long as a child of
-            seven and higher than furniture: of what stands in a room, little else is.
+        tall: ``(h, w)`` bool, of those alone whose surface is no wider than one of them, as long as
+            a child of seven and higher than furniture: of what stands in a room, little else is.
     """
 
     mask: npt.NDArray[np.bool_]
@@ -191,12 +191,11 @@ def upright_people(
     several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
     people = np.zeros(view.shape, np.bool_)
     tall_ones = np.zeros(view.shape, np.bool_)
-    for label in np.flatnonzero(possible & (one | several)):
-        left, upper, width, height = (int(v) for v in surfaces.boxes[label])
-        mask = surfaces.labels[upper : upper + height, left : left + width] == label
+    for label in np.flatnonzero(possible & (one | several)).tolist():
+        left, upper, mask = surfaces.crop(label)
         found = []
         if one[label]:
-            single = Silhouette.of(view, left, upper, mask, int(label), rim)
+            single = Silhouette.of(view, left, upper, mask, label, rim)
             found = [single] if upright(single, k, single.highest(elevation)) else []
         if not found and several[label]:
             parts = parted(view, forward, right, left, upper, mask)
