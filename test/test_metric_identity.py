@@ -1733,6 +1733,33 @@ def test_a_target_of_whom_depth_has_few_readings_is_followed_by_them():
             assert track.depth == pytest.approx(one.z, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ('share', 'rows', 'cols', 'found'),
+    [
+        (0.2, (0.4, 0.6), (0.1, 1.3), True),
+        (0.4, (0.0, 0.6), (0.2, 1.3), False),  # it fits the box as well
+    ],
+)
+def test_few_readings_are_followed_unless_what_is_nearer_may_be_meant_as_well(
+    share: float, rows: tuple[float, float], cols: tuple[float, float], found: bool
+):
+    """An arm before the middle of his box was enough for nobody to be there."""
+    one = Someone(0.0, 3.0)
+    color, depth = images([one])
+    box = one.box
+    door = slice(int(box.y) - 3, int(box.bottom) + 3), slice(50, 190)
+    unread = np.random.default_rng(1).random(depth[door].shape) > share
+    depth[door][(depth[door] > one.z) | unread] = np.nan
+    top, bottom = (round(box.y + row * box.height) for row in rows)
+    left, right = (round(box.x + col * box.width) for col in cols)
+    color[top:bottom, left:right], depth[top:bottom, left:right] = GREY, 2.0
+    scene = SceneReader(COLS, 0.04, 0.03, 0.0).read(Frame(color, depth, 0, CAMERA), 0.1)
+    seen = surface_of(Crowd().explain(scene, 0.0), box, MetricParameters())
+    assert (seen is not None) == found
+    if seen is not None:
+        assert seen.depth == pytest.approx(one.z, abs=0.05)
+
+
 def test_what_shows_behind_a_target_that_touches_a_door_frame_is_not_the_target():
     one = Someone(0.0, 3.0)
     color, depth = images([one])

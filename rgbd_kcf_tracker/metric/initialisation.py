@@ -334,9 +334,13 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
     if seen is None or _of_background(scene, seen, box):
         return None
     # What little depth there is of a small thing in a hand may be the hand's.
-    if seen.width * seen.height < SMALL or box_about(scene, seen).iou(box) < LOCK_IOU:
+    overlap = box_about(scene, seen).iou(box)
+    if seen.width * seen.height < SMALL or overlap < LOCK_IOU:
         return None
-    return seen
+    # Who is nearer and fits the box as well is meant, rather than what shows past him.
+    as_well = (_overlaps_of(scene, box) > AS_WELL * overlap)[labels]
+    nearer = as_well & scene.standing[part] & (depth < seen.depth - DEPTH_STEP)
+    return None if np.count_nonzero(nearer) > np.count_nonzero(mine) else seen
 
 
 def _meant(account: Account, box: Box) -> Silhouette | None:
