@@ -37,10 +37,10 @@ class ExpectedBody:
 
     def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
         """Depth where it is expected, and the pixels it would have if none were outside."""
-        if self.position[2] < 0.3:
+        box = self.box(scene.view)
+        if box is None:
             return np.zeros((0, 0), np.float32), 1.0
-        left, top, right, bottom = self.sides(scene.view)
-        shown = Box.from_corners(left, top, right, bottom)
+        shown = box.over(scene.view.step)
         return scene.view.depth[part_in(scene.view.shape, shown)], max(1.0, shown.area)
 
     def visible(self, scene: Scene) -> float:
