@@ -88,7 +88,7 @@ from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, co
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
-from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import person_sized
 from rgbd_kcf_tracker.metric.targets import MetricTargets
@@ -1125,7 +1125,11 @@ def test_who_walks_before_the_room_is_known_is_none_of_what_stands_still():
     ],
 )
 def test_little_of_somebody_is_somebody_where_it_reaches_up_to_where_heads_are(
-    top: float | None, beside: bool, parted: bool, somebody: bool
+    top: float | None,
+    beside: bool,
+    parted: bool,
+    somebody: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ):
     """Who sits behind a monitor, of whom no more shows than a head and a shoulder, was nobody."""
     watched = Watched()
@@ -1134,8 +1138,9 @@ def test_little_of_somebody_is_somebody_where_it_reaches_up_to_where_heads_are(
     small = min(range(len(account.sights)), key=lambda n: account.sights[n].figure.seen.area)
     sight = account.sights[small]
     assert sight.figure.seen.area < NEW_AREA
-    figure = dataclasses.replace(sight.figure, top=top, parted=parted)
+    figure = dataclasses.replace(sight.figure, parted=parted)
     account.sights[small] = Sight(figure, sight.view)
+    monkeypatch.setattr(Scene, 'top', lambda scene, seen: top)
     watched.crowd.learn(account, {})
     assert (account.owner[small] >= 0) == somebody
 

@@ -45,9 +45,8 @@ BETTER = 0.25
 """Share of the mean response by which another place must be better than where the target was
 expected: others in like clothes respond nearly as much, and mostly it is where it was."""
 SCALE_RATE = 0.025
-"""Share of a new sample in the filter over scale, for each
-:data:`~.identity.appearance.FRAME`, as in the paper of that
-filter (Danelljan et al., BMVC 2014)."""
+"""Share of a new sample in the filter over scale, for each :data:`~.identity.appearance.FRAME`, as
+in the paper of that filter (Danelljan et al., BMVC 2014)."""
 SCALE_TIME = 0.1
 """Seconds in which the size follows depth: some frames at 30 Hz, so that one odd reading hardly
 counts, and at once at 10 Hz and less."""

@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.metric.decide.account import Sight
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 
@@ -64,7 +65,11 @@ class PersonFinder:
                 continue
             person = account.people[owner]
             sure = person.alive and person.sightings >= SIGHTINGS
-            if sure and whole(sight) and rounded(account.scene.view, sight.figure.seen):
+            if (
+                sure
+                and whole(account.scene, sight)
+                and rounded(account.scene.view, sight.figure.seen)
+            ):
                 found.append(sight)
         if not found:
             return None
@@ -72,9 +77,9 @@ class PersonFinder:
         return outline_box(account.scene, nearest).clipped(frame.width, frame.height)
 
 
-def whole(sight: Sight) -> bool:
+def whole(scene: Scene, sight: Sight) -> bool:
     """Whether a sight shows somebody from head to hips and from side to side."""
-    seen, top = sight.figure.seen, sight.figure.top
+    seen, top = sight.figure.seen, scene.top(sight.figure.seen)
     if sight.figure.parted or seen.cut.left or seen.cut.top or seen.cut.right:
         return False
     if seen.height < max(LEAST_HEIGHT, ASPECT * seen.width):

@@ -91,7 +91,7 @@ def _person_at(frame: Frame, u: float, v: float) -> Box | None:
     where = near if (large | ~scene.standing[at]).all() else at
     for figure in find_figures(scene, np.zeros((0, 2))):
         shows = figure.seen.in_view(scene.view.shape)[where].any()
-        if shows and upright(figure.seen, scene.view.intrinsics, figure.top):
+        if shows and upright(figure.seen, scene.view.intrinsics, scene.top(figure.seen)):
             return outline_box(scene, figure.seen).clipped(frame.width, frame.height)
     return None
 

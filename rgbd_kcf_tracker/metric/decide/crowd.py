@@ -477,7 +477,8 @@ def _followed(
 def _is_head(account: Account, column: int) -> bool:
     """Whether a sight that is small reaches up to where heads are, apart from all others."""
     figure = account.sights[column].figure
-    if figure.top is None or not HEAD_LEVEL < figure.top < TOP[1]:
+    top = account.scene.top(figure.seen)
+    if top is None or not HEAD_LEVEL < top < TOP[1]:
         return False
     others = (s.figure.place for n, s in enumerate(account.sights) if n != column)
     apart = all(np.hypot(*(figure.place - place)) > BESIDE for place in others)

@@ -141,7 +141,7 @@ class MixUps:
         self, here: Sequence[Followed], gone: Sequence[tuple[Person, Likeness]], time: float
     ) -> MixUp | None:
         """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
-        hidden = [each for each in gone if time - each[0].seen_at < HIDDEN_FOR]
+        hidden = [(who, alike) for who, alike in gone if time - who.seen_at < HIDDEN_FOR]
         tallies: dict[tuple[int, int], Tally] = {}
         found = None
         for one in here:

@@ -64,6 +64,9 @@ def view_image(color: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uint8]
     Args:
         color: the image.
         step: as of the :class:`~rgbd_kcf_tracker.metric.perceive.depth_view.DepthView`.
+
+    Returns:
+        ``(h, w, 3)`` uint8, of the view's size.
     """
     # The exact nearest neighbours of OpenCV 4.6 are others at even steps.
     first = step // 2

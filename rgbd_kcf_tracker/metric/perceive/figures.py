@@ -63,13 +63,11 @@ class Figure:
 
     Attributes:
         seen: the silhouette.
-        top: metres above the floor of its upper end; None where no floor is known or it is cut off.
         place: ``(2,)`` metres across and along the floor from the camera.
         parted: whether it was cut out of a figure of several, so that its outline is a guess.
     """
 
     seen: Silhouette
-    top: float | None
     place: FloatArray
     parted: bool
 
@@ -109,8 +107,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         for each in parts:
             seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
             if seen is not None and makes_figure(scene, seen):
-                highest = None if seen.cut.top else seen.highest(scene.elevation)
-                found.append(Figure(seen, highest, place_of(scene, seen), len(parts) > 1))
+                found.append(Figure(seen, place_of(scene, seen), len(parts) > 1))
     return found
 
 

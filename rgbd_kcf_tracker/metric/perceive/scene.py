@@ -104,6 +104,13 @@ class Scene:
         b = box.over(self.view.step)
         return self.rim.reached(b.x, b.y, b.right, b.bottom, self.view)
 
+    def top(self, seen: Silhouette) -> float | None:
+        """Metres above the floor of a silhouette's upper end; None where it is cut off there.
+
+        None where no floor is known, too.
+        """
+        return None if seen.cut.top else seen.highest(self.elevation)
+
     def silhouette(self, label: int) -> Silhouette:
         """One surface as a silhouette; the same for whoever asks."""
         seen = self._silhouettes.get(label)
