@@ -127,6 +127,17 @@ def test_a_signal_comes_while_the_command_runs(
     assert all((o.code == -signal.SIGKILL) != o.late for o in outcomes)
 
 
+def test_a_signal_to_who_is_just_ending_is_late(
+    injector: inject.Injector, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was sent, and tried nothing: once in some hundred runs."""
+    monkeypatch.setattr(inject, '_draw', signalled)
+    monkeypatch.setattr(inject, '_sent', lambda *_: True)
+    (outcome,) = injector.trials(0, 1)
+    assert outcome.code == 0
+    assert outcome.late
+
+
 def test_a_signal_to_who_has_just_ended_is_late() -> None:
     process = subprocess.Popen(['true'])
     process.wait()

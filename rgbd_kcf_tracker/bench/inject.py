@@ -179,6 +179,8 @@ class Injector:
         if hung:
             process.kill()
             process.join()
+        # Nobody outlives this one: whoever has a code of his own was ending when it came.
+        late |= trial.signal == signal.SIGKILL and not hung and process.exitcode != -signal.SIGKILL
         said = log.read_bytes().decode('utf-8', 'replace') if log.exists() else ''
         return (None if hung else process.exitcode), time.monotonic() - begun, said, late
 
