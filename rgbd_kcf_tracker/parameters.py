@@ -42,6 +42,7 @@ class ParameterInfo:
         minimum, maximum: inclusive range of a number, None where open.
         choices: allowed values of a string, empty where any is.
         source: where the default comes from (thesis section, paper, or 'ours').
+        file: whether a text is the path of a file, or empty for none.
     """
 
     name: str
@@ -53,6 +54,7 @@ class ParameterInfo:
     maximum: float | None = None
     choices: tuple[str, ...] = ()
     source: str = 'ours'
+    file: bool = False
 
 
 def parameter(
@@ -64,6 +66,7 @@ def parameter(
     maximum: float | None = None,
     choices: tuple[str, ...] = (),
     source: str = 'ours',
+    file: bool = False,
 ) -> Any:
     """A dataclass field that carries its :class:`ParameterInfo`."""
     return field(
@@ -75,6 +78,7 @@ def parameter(
             'maximum': maximum,
             'choices': choices,
             'source': source,
+            'file': file,
         },
     )
 
@@ -116,6 +120,12 @@ def describe(cls: type) -> tuple[ParameterInfo, ...]:
             )
         )
     return tuple(infos)
+
+
+def files_named(parameters: Parameters) -> list[str]:
+    """Paths of the files that parameters name."""
+    named = [getattr(parameters, i.name) for i in describe(type(parameters)) if i.file]
+    return [path for path in named if path]
 
 
 def checked(info: ParameterInfo, value: object) -> Scalar:

@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.cues import Cue
+from rgbd_kcf_tracker.metric.identity.embedding import Embedding
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.metric.targets import MetricTargets
@@ -29,11 +30,12 @@ class TargetSet:
     Args:
         variant: name of the tracker.
         parameters: its parameters, None for the released defaults.
-        cues: further ones for the verdict of ``metric``, as an embedding's likeness.
+        cues: further ones for the verdict of ``metric``.
+        embedding: describes people for ``metric``, instead of the network that its parameters name.
 
     Raises:
-        ParameterError: for an unknown variant, parameters of another one, or cues with another than
-            ``metric``.
+        ParameterError: for an unknown variant, parameters of another one, a network that cannot be
+            run, or cues or an embedding with another than ``metric``.
 
     Example:
         >>> targets = TargetSet('metric')
@@ -47,15 +49,16 @@ class TargetSet:
         variant: str = DEFAULT_VARIANT,
         parameters: Parameters | None = None,
         cues: Sequence[Cue] = (),
+        embedding: Embedding | None = None,
     ) -> None:
         create_tracker(variant, parameters)  # refuses what does not fit
         self._variant = variant
         self._parameters = parameters or default_parameters(variant)
         self._together: MetricTargets | None = None
         if isinstance(self._parameters, MetricParameters):
-            self._together = MetricTargets(self._parameters, cues)
-        elif cues:
-            raise ParameterError(f'variant {variant} knows no cues: use metric')
+            self._together = MetricTargets(self._parameters, cues, embedding=embedding)
+        elif cues or embedding is not None:
+            raise ParameterError(f'variant {variant} knows no cues and no embedding: use metric')
         self._trackers: dict[int, Tracker] = {}
         self._started: dict[int, Track] = {}
         self._next = 1

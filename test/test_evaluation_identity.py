@@ -143,7 +143,7 @@ def evaluate(*words: object) -> int:
 
 
 def test_the_command(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):
-    monkeypatch.setattr(identity, 'metric_views', lambda: BY_COLOR)
+    monkeypatch.setattr(identity, 'metric_views', lambda parameters: BY_COLOR)
     report = tmp_path / 'report'
     assert evaluate(two_cameras, '--identity', '--fps', 1, '--report', report) == 0
     assert 'area under ROC %' in capsys.readouterr().out
@@ -163,7 +163,7 @@ def test_the_command(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):
 
 
 def test_a_recording_that_fails_is_listed(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):
-    monkeypatch.setattr(identity, 'metric_views', lambda: BY_COLOR)
+    monkeypatch.setattr(identity, 'metric_views', lambda parameters: BY_COLOR)
     (two_cameras / 'lab_cam2' / 'mot.txt').write_text('1,2\n')
     report = tmp_path / 'report'
     assert evaluate(two_cameras, '--identity', '--fps', 1, '--report', report) == 1
@@ -175,3 +175,17 @@ def test_what_does_not_go_with_it(two_cameras: Path, tmp_path: Path, capsys):
     words = ('--identity', '--variants', 'metric', '--report', tmp_path / 'report')
     assert evaluate(two_cameras, *words) == 2
     assert '--variants means nothing with --identity' in capsys.readouterr().err
+
+
+def test_parameters_of_metric_go_with_it(two_cameras: Path, tmp_path: Path, monkeypatch, capsys):
+    """So a network can be measured by how well it tells people apart."""
+    given = []
+    monkeypatch.setattr(
+        identity, 'metric_views', lambda parameters: given.append(parameters) or BY_COLOR
+    )
+    words = (two_cameras, '--identity', '--fps', 1, '--report', tmp_path / 'report', '--param')
+    assert evaluate(*words, 'metric.embedding_even=0.4', '--param', 'embedding_steepness=9') == 0
+    assert {(p.embedding_even, p.embedding_steepness) for p in given} == {(0.4, 9.0)}
+    for wrong, said in (('kcf.padding=2', "the tracker is metric, not 'kcf'"), ('x=1', "'x'")):
+        assert evaluate(*words, wrong) == 2
+        assert said in capsys.readouterr().err

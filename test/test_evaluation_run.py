@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.evaluation.jobs import (
     RunOptions,
     is_done,
     meta_path,
+    run_key,
     thumbnails_path,
     tracks_path,
     truth_key,
@@ -185,6 +186,15 @@ def test_pictures_of_another_rate_do_not_stay(tmp_path: Path):
         runner.run([one], [KCF], tmp_path, RunOptions())
         path = thumbnails_path(tmp_path, 'a', truth_key(one, RunOptions()))
         assert len(read_thumbnails(path)) == kept
+
+
+def test_a_run_is_made_again_when_a_file_that_its_parameters_name_changes(tmp_path: Path):
+    network = tmp_path / 'people.onnx'
+    network.write_bytes(b'one network')
+    named = Contender('m', 'variant', 'metric', (('embedding', str(network)),))
+    before = [run_key(sequence('a'), named, RunOptions()) for _ in range(2)]
+    network.write_bytes(b'another network')
+    assert len({*before, run_key(sequence('a'), named, RunOptions())}) == 2
 
 
 def test_runs_of_one_name_in_one_folder_are_each_held_against_their_own_truth(tmp_path: Path):

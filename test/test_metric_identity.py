@@ -249,12 +249,12 @@ def test_views_without_common_parts_say_nothing():
         assert same_person(one, other) == 0.5
         gallery = Gallery.of(one, 0.0)
         assert gallery.looks is not None
-        before = gallery.log_odds_before(1.0, other, similarity(other, gallery.looks))
+        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness())
         assert gallery.log_odds(other) == before == 0.0
         assert math.isnan(alike(one, other))
         gallery.learn(other, 0.0)
         assert gallery.views == [one, other], 'it shows what was not known'
-        before = gallery.log_odds_before(1.0, other, similarity(other, gallery.looks))
+        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness())
         assert before is not None
         assert (before == 0.0) if other is empty else (before > 1)
     gallery = Gallery()
@@ -300,12 +300,12 @@ def test_what_one_view_does_not_show_is_as_in_the_others():
         compared = Compared.of(seen, looks)
         assert compared.similarity() == pytest.approx([alike(seen, v) for v in (upper, whole)])
         assert compared.similarity()[0] > 0.95
-        assert (compared.of_each([0])[0] > 0.95) == (trousers == BLUE)
+        assert (compared.of_each([0])[0, 0] > 0.95) == (trousers == BLUE)
     # Each is compared with what is known of himself alone.
     both = Compared.of(look(RED, GREEN), Looks.of([upper, whole, look(RED, GREEN)]))
-    assert both.of_each([0, 2]) == pytest.approx([compared.of_each([0])[0], 1.0], abs=1e-4)
+    assert both.of_each([0, 2])[:, 0] == pytest.approx([compared.of_each([0])[0, 0], 1], abs=1e-4)
     # Where nothing is known of his trousers, they say nothing.
-    assert Compared.of(look(RED, GREEN), Looks.of([upper])).of_each([0])[0] > 0.95
+    assert Compared.of(look(RED, GREEN), Looks.of([upper])).of_each([0])[0, 0] > 0.95
 
 
 def test_a_gallery_learns_what_is_new_keeps_the_first_and_is_bounded():
@@ -359,7 +359,7 @@ def test_what_a_gallery_learned_of_somebody_else_is_taken_back_and_given_to_him(
         gallery.learn_height(top, time)
     green = look(GREEN)
     assert gallery.looks is not None
-    alike = similarity(green, gallery.looks)
+    alike = Compared.of(green, gallery.looks).likeness()
     before = gallery.log_odds_before(2.0, green, alike)
     assert before is not None
     assert before < 0 < gallery.log_odds(green)
@@ -1384,8 +1384,8 @@ def likeness(person: Person, seen: Sequence[View]):
     """How alike those who are seen are to each view of somebody."""
     looks = person.gallery.looks
     if looks is None:
-        return np.zeros((0, len(seen)))
-    return np.stack([similarity(view, looks) for view in seen], axis=1)
+        return np.zeros((0, len(seen), 2))
+    return np.stack([Compared.of(view, looks).likeness() for view in seen], axis=1)
 
 
 def met(number: int, place: tuple[float, float], seen: Sequence[View], learned: View | None):
@@ -2017,7 +2017,8 @@ def test_of_whom_another_hides_a_part_not_all_was_drawn(
     frame = picture([one, *beside], 0.4, unread=one)
     scene = reader.read(frame, 0.1)
     assert scene is not None
-    drawn = Drawn.of(scene, one.box, ByLook(frame, one.box, MetricParameters()), 0.4)
+    account = Crowd().explain(scene, 0.4)
+    drawn = Drawn.of(account, one.box, ByLook(frame, one.box, MetricParameters()))
     assert drawn is not None
     assert drawn.whole == (x != 0.45)
 

@@ -31,6 +31,7 @@ from rgbd_kcf_tracker.cli.common import (
     parse_assignments,
     progress,
     refuse,
+    tracker_parameters,
 )
 from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.workers import WORKER_OPTIONS, add_worker_options, record, shard_of
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from rgbd_kcf_tracker.evaluation.datasets import Sequence as Benchmark
     from rgbd_kcf_tracker.evaluation.parts import Whole
     from rgbd_kcf_tracker.evaluation.report import Heading
+    from rgbd_kcf_tracker.parameters import Parameters
 
 NAME = 'evaluate'
 HELP = 'run trackers on benchmarks or simulated scenes and write a report'
@@ -226,15 +228,17 @@ def _report_one(folder: Path, whole: Whole) -> int:
 def _identity(args: argparse.Namespace) -> int:
     from rgbd_kcf_tracker.evaluation.datasets import open_dataset
 
-    options = ('everyone', 'variants', 'boxes', 'param', 'ablate', 'fresh', *WORKER_OPTIONS)
+    options = ('everyone', 'variants', 'boxes', 'ablate', 'fresh', *WORKER_OPTIONS)
     refuse(args, 'with --identity', ('kind', *options, *_OF_ONE_TARGET), usual=USUAL)
     read = data_options(args, everyone=args.everyone or args.identity)
     sequences = checked(args, [s for text in args.dataset for s in open_dataset(text, read)])
     with report_folder(args.report):
-        return _compare(args, sequences)
+        return _compare(args, sequences, tracker_parameters(args, 'metric'))
 
 
-def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
+def _compare(
+    args: argparse.Namespace, sequences: Sequence[Benchmark], parameters: Parameters
+) -> int:
     from rgbd_kcf_tracker.evaluation import identity
     from rgbd_kcf_tracker.evaluation.jobs import Failure, as_asked
     from rgbd_kcf_tracker.evaluation.report import PAGE, write_identity_report
@@ -244,11 +248,11 @@ def _compare(args: argparse.Namespace, sequences: Sequence[Benchmark]) -> int:
         try:
             samples = as_asked(sequence.open().samples, sequence, run_options(args))
             frames = progress(samples, None, sequence.name)
-            seen.append(identity.look(sequence.name, frames, identity.metric_views()))
+            seen.append(identity.look(sequence.name, frames, identity.metric_views(parameters)))
         except RgbdKcfError as error:
             failures.append(Failure(sequence.name, '', str(error)))
     record(args.report, 'one process', failures=len(failures))
-    pairs = identity.all_pairs(seen, identity.metric_views())
+    pairs = identity.all_pairs(seen, identity.metric_views(parameters))
     table = write_identity_report(args.report, pairs, failures, _heading(args))
     print(table.text())
     print(f'\nreport: {escaped(str(args.report / PAGE))}')

@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Sample
 from rgbd_kcf_tracker.evaluation.metrics.separation import Separation, separation
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.parameters import Parameters
 
 APART_S = 3.0
 """Sightings nearer in time are too alike to say anything."""
@@ -112,14 +113,20 @@ class Pairs:
         return separation(self.probability, self.same)
 
 
-def metric_views() -> Views:
-    """How the ``metric`` tracker describes and compares people; new ones for a recording."""
+def metric_views(parameters: Parameters | None = None) -> Views:
+    """How the ``metric`` tracker describes and compares people; new ones for a recording.
+
+    Args:
+        parameters: of ``metric``; None for the released defaults.
+    """
     from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
     from rgbd_kcf_tracker.metric.identity.gallery import same_person
     from rgbd_kcf_tracker.metric.parameters import MetricParameters
     from rgbd_kcf_tracker.metric.targets import MetricTargets
 
-    targets = MetricTargets(MetricParameters())
+    parameters = parameters or MetricParameters()
+    assert isinstance(parameters, MetricParameters)
+    targets = MetricTargets(parameters)
     targets.everyone = True
 
     def describe(frame: Frame, box: Box) -> object | None:

@@ -43,6 +43,7 @@ from rgbd_kcf_tracker.evaluation.store import (
 )
 from rgbd_kcf_tracker.evaluation.times import write_times
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.parameters import files_named
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.track import Track
 
@@ -133,6 +134,9 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
     extra = ''
     if contender.kind == 'boxes':
         extra = dict(contender.files).get(sequence.name) or boxes_digest(sequence, contender)
+    elif contender.kind == 'variant':
+        files = files_named(contender.parameters())
+        extra = files_digest([Path(file) for file in files]) if files else ''
     parts = [
         *_source(sequence), contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,

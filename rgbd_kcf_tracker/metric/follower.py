@@ -240,7 +240,8 @@ class Follower:
         cut = seen.cut.top or seen.cut.left or seen.cut.right
         hidden = cut and person.gallery.top is None
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
-            known = View.of(view, account.scene.codes, seen, None, above)
+            described = person.gallery.views[0].described
+            known = View.of(view, account.scene.codes, seen, None, above, described)
             person.gallery = Gallery.of(known, account.time)
 
     def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
@@ -250,7 +251,7 @@ class Follower:
             return
         if np.count_nonzero(seen.mask) > LEAST_KNOWN * box.over(account.scene.view.step).area:
             return
-        known = view_in(account.scene, box, look, seen.depth)
+        known = view_in(account.scene, box, look, seen.depth, account.described(box))
         if known is None or len(person.gallery.views) != 1:
             return
         person.gallery.learn(known, account.time)

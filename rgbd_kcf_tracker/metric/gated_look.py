@@ -101,7 +101,7 @@ class GatedLook:
         self.drawn: Drawn | None = None
         if account is not None:
             if look.unread or _tall(account.scene, box, look):
-                self.drawn = Drawn.of(account.scene, box, look, account.time)
+                self.drawn = Drawn.of(account, box, look)
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             part = _part(account.scene, box)
             self._began = part, account.scene.view.depth[part].copy()

@@ -135,3 +135,23 @@ class MetricParameters(Parameters):
         minimum=0.0,
         maximum=2.0,
     )
+    embedding: str = parameter(
+        '',
+        'ONNX file of a network that describes people by pictures of 128 x 256 pixels; empty for '
+        'none.',
+        file=True,
+    )
+    embedding_even: float = parameter(
+        0.56,
+        'Cosine of its vectors at which two are as often of one person as of two.',
+        minimum=-1.0,
+        maximum=1.0,
+        source='fitted to OSNet x0.25 (MSMT17) on real people',
+    )
+    embedding_steepness: float = parameter(
+        12.0,
+        'Log-odds of being one person for each unit of the cosine.',
+        minimum=0.0,
+        maximum=1000.0,
+        source='likewise',
+    )

@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import LEARNED, Follower
+from rgbd_kcf_tracker.metric.identity.embedding import Describer, Embedding, Onnx
 from rgbd_kcf_tracker.metric.identity.middle import (
     in_metres,
     row_by_row,
@@ -59,6 +60,10 @@ class MetricTargets:
         parameters: see :class:`MetricParameters`.
         cues: further ones for the verdict.
         first: the number by which cues know the first person.
+        embedding: describes people, instead of the network that the parameters name.
+
+    Raises:
+        ParameterError: where the network that the parameters name cannot be run.
 
     Attributes:
         everyone: whether people whom nobody chose get tracks too.
@@ -68,10 +73,15 @@ class MetricTargets:
     """
 
     def __init__(
-        self, parameters: MetricParameters, cues: Sequence[Cue] = (), first: int = 1
+        self,
+        parameters: MetricParameters,
+        cues: Sequence[Cue] = (),
+        first: int = 1,
+        embedding: Embedding | None = None,
     ) -> None:
         self._parameters = parameters
         self._cues = cues
+        self._embedding = embedding or _network(parameters)
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
         self._reader, self._crowd = self._new_memory(first)
@@ -200,7 +210,9 @@ class MetricTargets:
 
     def _new_memory(self, first: int) -> tuple[SceneReader, Crowd]:
         p = self._parameters
-        return SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin), Crowd(first)
+        reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin)
+        self._describer = None if self._embedding is None else Describer(self._embedding)
+        return reader, Crowd(first, self._describer)
 
     def _follower(self, frame: Frame, box: Box) -> Follower:
         """Whoever is in a box of the frame that was perceived."""
@@ -289,6 +301,8 @@ class MetricTargets:
             self._metres, self._told_at = self._camera or Intrinsics.guess(*size), None
         scene = self._reader.read(frame, dt) if self._parameters.use_surfaces else None
         self.account = None
+        if self._describer is not None:
+            self._describer.frame = frame
         if scene is not None:
             self.account = self._crowd.explain(scene, self._time, self._reader.is_somebody)
         return dt
@@ -414,16 +428,34 @@ class MetricTargets:
         return tracks
 
 
+def _network(parameters: MetricParameters) -> Embedding | None:
+    """The network that parameters name, if they do."""
+    p = parameters
+    if not p.embedding:
+        return None
+    return Onnx(p.embedding, p.embedding_even, p.embedding_steepness)
+
+
 class MetricTracker:
     """One target: the same as :class:`MetricTargets` with one.
 
     Args:
         parameters: see :class:`MetricParameters`.
         cues: further ones for the verdict.
+        embedding: see :class:`MetricTargets`.
+
+    Raises:
+        ParameterError: likewise.
     """
 
-    def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
+    def __init__(
+        self,
+        parameters: MetricParameters,
+        cues: Sequence[Cue] = (),
+        embedding: Embedding | None = None,
+    ) -> None:
         self._parameters, self._cues = parameters, cues
+        self._embedding = embedding or _network(parameters)
         self._targets: MetricTargets | None = None
         self._number = 0
 
@@ -435,7 +467,7 @@ class MetricTracker:
         """See :meth:`~rgbd_kcf_tracker.track.Tracker.start`."""
         require_inside(box, frame)
         first = 1 if self._targets is None else self._targets.next_person
-        self._targets = MetricTargets(self._parameters, self._cues, first)
+        self._targets = MetricTargets(self._parameters, self._cues, first, self._embedding)
         self._number = self._targets.add(frame, box)
         return dataclasses.replace(self._targets.started(self._number), id=0)
 

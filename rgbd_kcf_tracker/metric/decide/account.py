@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
-from rgbd_kcf_tracker.metric.identity.gallery import View, similarity
+from rgbd_kcf_tracker.metric.identity.embedding import Described, Describer
+from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -110,6 +113,7 @@ class Account:
         sure: how likely those who came back are whom they were taken for, 0 to 1, by their numbers.
         owner: for each sight the index among ``people``, or -1.
         verdict: the same as the frame explains itself best, who was chosen and is away included.
+        describer: of what else the frame shows; None without a network.
     """
 
     scene: Scene
@@ -123,6 +127,7 @@ class Account:
     sure: Mapping[int, float]
     owner: list[int] = field(default_factory=list)
     verdict: list[int] = field(default_factory=list)
+    describer: Describer | None = None
     _places: dict[Silhouette, FloatArray] = field(default_factory=dict)
 
     @cached_property
@@ -200,6 +205,22 @@ class Account:
                 return sight.view
         return look_of(self.scene, seen)
 
+    def described(self, box: Box) -> Described | None:
+        """How a network describes what is in a box of the frame; None without one."""
+        return None if self.describer is None else self.describer.describe([box])[0]
+
+    def to_learn(self, seen: Silhouette, view: View) -> View:
+        """The look of a silhouette with all that can be told of it."""
+        if self.describer is None or view.described is not None:
+            return view
+        index = self.sight_of(seen)
+        known = self.sights[index].view.described if self._is_nearly(seen, index) else None
+        return replace(view, described=known or self.described(box_about(self.scene, seen)))
+
+    def _is_nearly(self, seen: Silhouette, index: int) -> bool:
+        """Whether hardly anything of a sight is missing in a silhouette that is part of it."""
+        return index >= 0 and SAME < self.sights[index].figure.seen.area / seen.area < 1 / SAME
+
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being ``person``.
 
@@ -215,10 +236,8 @@ class Account:
         stranger = self.stranger(person, index)
         if stranger is not None:
             look = stranger.resemblance(person.number)
-        if look is None and index >= 0:
-            whole = self.sights[index].figure.seen
-            if SAME < whole.area / seen.area < 1 / SAME:
-                look = float(self.looks[row, index])
+        if look is None and self._is_nearly(seen, index):
+            look = float(self.looks[row, index])
         if look is None:
             look = person.gallery.log_odds(self.look(seen))
         rival = mine = 0.0
@@ -251,7 +270,7 @@ class Account:
                     continue
                 # That somebody looks as he has since he came tells nothing of who he is.
                 view = self.sights[index].view
-                alike = similarity(view, other.gallery.looks)
+                alike = Compared.of(view, other.gallery.looks).likeness()
                 came = self.time if self.was_away(other) else other.came
                 look = other.gallery.log_odds_before(came, view, alike)
             if look is not None:
@@ -348,10 +367,15 @@ class Account:
         return mask
 
 
-def look_of(scene: Scene, seen: Silhouette) -> View:
+def look_of(scene: Scene, seen: Silhouette, described: Described | None = None) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
     That is where the image ends below it, or depth does beside the upper end of what shows.
+
+    Args:
+        scene: of the frame.
+        seen: the silhouette.
+        described: how a network describes it, where one was asked.
     """
     highest, above = seen.highest(scene.elevation), 0.0
     top = None if seen.cut.top else highest
@@ -363,7 +387,7 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
         least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
         if highest is not None and least < highest < most:
             above = STATURE - highest
-    return View.of(scene.view, scene.codes, seen, top, above)
+    return View.of(scene.view, scene.codes, seen, top, above, described)
 
 
 def absent(gone: float, misses: int) -> bool:

@@ -49,21 +49,21 @@ def log_odds(
 
     Returns:
         ``(m, n)`` log-odds, the same by the look and the height alone, and for each of the people
-        ``(v, n)`` likeness to each of his views.
+        ``(v, n, 2)`` likeness to each of his views.
     """
     odds = np.zeros((len(people), len(sights)))
     looks = np.zeros_like(odds)
-    alike = np.zeros((0, len(sights)), np.float32)
+    alike = np.zeros((0, len(sights), 2), np.float32)
     if not odds.size:
         return odds, looks, [alike] * len(people)
     known = tuple(p.gallery.looks for p in people if p.gallery.looks is not None)
-    best: list[list[float]] = []
+    best: list[list[list[float]]] = []
     if known:
         everyone = joined(known)
         compared = [Compared.of(sight.view, everyone) for sight in sights]
-        alike = np.array([each.similarity() for each in compared]).T
+        alike = np.stack([each.likeness() for each in compared], axis=1)
         starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
-        best = np.array([each.of_each(starts) for each in compared]).T.tolist()
+        best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
     rows = iter(best)
     places = np.array([s.figure.place for s in sights])
     low = np.array([not came(scene, s.figure.seen) for s in sights])

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -27,13 +27,15 @@ from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.decide.stayed import stayed
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
+from rgbd_kcf_tracker.metric.identity.embedding import Described, Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
-from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, find_figures
+from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -75,6 +77,7 @@ class Crowd:
 
     Args:
         first: number of the first.
+        describer: of everybody in the frame that is explained next; None without a network.
 
     Attributes:
         next: number of whoever comes next.
@@ -82,7 +85,8 @@ class Crowd:
         time: seconds of the last frame.
     """
 
-    def __init__(self, first: int = 1) -> None:
+    def __init__(self, first: int = 1, describer: Describer | None = None) -> None:
+        self._describer = describer
         self.people: list[Person] = []
         self.time = 0.0
         self.next = first
@@ -233,7 +237,7 @@ class Crowd:
                 opens(seen)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))
-        sights = [Sight(f, look_of(scene, f.seen)) for f in figures]
+        sights = self._sights(scene, figures, time)
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
@@ -249,10 +253,20 @@ class Crowd:
                 self._compare(account, row, column)
         return account
 
+    def _sights(self, scene: Scene, figures: list[Figure], time: float) -> list[Sight]:
+        """The look of each figure, described where there is a network."""
+        described: Sequence[Described | None] = [None] * len(figures)
+        if self._describer is not None and figures:
+            boxes = [box_about(scene, figure.seen) for figure in figures]
+            places = np.stack([figure.place for figure in figures])
+            described = self._describer.describe_all(boxes, places, time)
+        pairs = zip(figures, described, strict=True)
+        return [Sight(figure, look_of(scene, figure.seen, said)) for figure, said in pairs]
+
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float
     ) -> tuple[Account, list[Likeness]]:
-        """The account of a frame, and how alike its sights are to each one's views, ``(v, n)``."""
+        """The account, and the ``(v, n, 2)`` likeness of its sights to each one's views."""
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
         )
@@ -267,6 +281,7 @@ class Crowd:
             self._frames > SETTLED,
             against,
             self._comebacks.sure,
+            describer=self._describer,
         )
         account.verdict = assigned(odds)
         # Whoever was chosen and has been away comes back as a stranger first, until his looks have
@@ -459,7 +474,7 @@ def _followed(
 
     Args:
         account: of the frame.
-        alike: for each of its people, ``(v, n)``, see :func:`~.association.log_odds`.
+        alike: for each of its people, ``(v, n, 2)``, see :func:`~.association.log_odds`.
     """
     here = [
         Followed(account.people[row], sight.figure.place, sight.view, column, alike[row])

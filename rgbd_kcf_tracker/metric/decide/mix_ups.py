@@ -49,7 +49,8 @@ class Followed(NamedTuple):
         place: ``(2,)`` metres across and along the floor.
         view: his look.
         column: of his sight.
-        alike: ``(v, n)`` likeness of each of the ``n`` sights to each view of his gallery.
+        alike: ``(v, n, 2)`` likeness of each of the ``n`` sights to each view of his gallery, see
+            :meth:`~rgbd_kcf_tracker.metric.identity.gallery.Compared.likeness`.
     """
 
     person: Person
@@ -154,7 +155,9 @@ class MixUps:
                 )
                 if taken is None:
                     continue
-                odds = other.gallery.log_odds(one.view, float(np.fmax.reduce(alike[:, one.column])))
+                odds = other.gallery.log_odds(
+                    one.view, np.fmax.reduce(alike[:, one.column]).tolist()
+                )
                 key = one.person.number, other.number
                 said = tallies[key] = self._hidden.get(key) or Tally()
                 said.add(min(odds, odds - taken), self._counts * one.view.shows, time)

@@ -91,7 +91,7 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     if view.top is not None and view.top > 1.2:
         person.gallery.learn_height(view.top, account.time)
     if whole or not person.gallery.views:
-        person.gallery.learn(view, account.time)
+        person.gallery.learn(account.to_learn(seen, view), account.time)
 
 
 def _came(scene: Scene, seen: Silhouette) -> bool:

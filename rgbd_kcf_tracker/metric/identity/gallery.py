@@ -8,6 +8,7 @@ top of the head, so that it does not change with distance (colour in height slic
 root of the hand-made descriptors, as of Lisanti et al., "Person re-identification by iterative
 re-weighted sparse ranking", 2015). Views are compared slice by slice by the Bhattacharyya
 coefficient, at the shift of lightness that fits best: the same shirt is brighter near the window.
+Where a network describes people as well (:mod:`~.embedding`), a view has its vector, too.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import Floats
+from rgbd_kcf_tracker.metric.identity.embedding import Described
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -51,6 +53,10 @@ alike, whosever they are); fitted on real and simulated people (docs/figures.md)
 EVEN_GREY = 0.84
 """Where it is even before a camera without colour: there all are more alike by as much. Fitted on
 the same people without their colours, as is the steepness, which comes out the same."""
+NETWORK_PER_VIEW, NETWORK_SAME, BESIDE_NETWORK = 0.36, 0.25, 0.75
+"""What a network's log-odds lose with each doubling of the views, the most that they say for
+somebody, since those whom it confuses look alike in all, and the share of the colours' log-odds
+that is left beside them, as both see the same clothes: fitted as the others (docs/figures.md)."""
 SUREST_SAME, SUREST_OTHER, SUREST_PART = 4.0, -4.0, 3.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round; and the
 most that the least part can say for somebody, as more things look like a small one."""
@@ -92,6 +98,7 @@ class View:
         color: ``(SLICES,)`` float32, how colourful each slice is, at least 1.
         top: metres above the floor of the head's top, None where it is hidden or no floor known.
         grey: whether the camera sees no colours.
+        described: how a network describes it; None where there is none, or it was not asked.
     """
 
     roots: Floats
@@ -99,6 +106,7 @@ class View:
     color: Floats
     top: float | None
     grey: bool = False
+    described: Described | None = None
 
     @classmethod
     def of(
@@ -108,6 +116,7 @@ class View:
         seen: Silhouette,
         top: float | None,
         above: float = 0.0,
+        described: Described | None = None,
     ) -> View:
         """The look of a silhouette.
 
@@ -117,6 +126,7 @@ class View:
             seen: the silhouette.
             top: metres above the floor of its top, or None.
             above: metres of him that are above the silhouette, where that is known.
+            described: see :class:`View`.
         """
         mask = seen.mask.view(np.uint8)
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=0)
@@ -142,6 +152,7 @@ class View:
             np.maximum(color, 1).astype(np.float32),
             top,
             codes.grey,
+            described,
         )
 
     @cached_property
@@ -162,11 +173,13 @@ class Looks:
     Attributes:
         roots: ``(SLICES, n * LIGHTNESS, TINTS * TINTS)``.
         area, color: ``(n, SLICES)``.
+        vectors: ``(n, d)``, of a network; NaN for views without, and of no columns if none has one.
     """
 
     roots: Floats
     area: Floats
     color: Floats
+    vectors: Floats
 
     def __len__(self) -> int:
         return len(self.area)
@@ -178,6 +191,7 @@ class Looks:
             np.concatenate([v.roots for v in views], axis=1),
             np.stack([v.area for v in views]),
             np.stack([v.color for v in views]),
+            _stacked([_NONE if v.described is None else v.described.vector[None] for v in views]),
         )
 
     @classmethod
@@ -187,7 +201,22 @@ class Looks:
             np.concatenate([each.roots for each in looks], axis=1),
             np.concatenate([each.area for each in looks]),
             np.concatenate([each.color for each in looks]),
+            _stacked([each.vectors for each in looks]),
         )
+
+
+_NONE = np.zeros((1, 0), np.float32)
+
+
+def _stacked(vectors: list[Floats]) -> Floats:
+    """Those of each, ``(n, d)``, or ``(n, 0)`` where there are none, below each other."""
+    size = max(each.shape[1] for each in vectors)
+    return np.concatenate(
+        [
+            each if each.shape[1] == size else np.full((len(each), size), np.nan, np.float32)
+            for each in vectors
+        ]
+    )
 
 
 _DIAGONALS = np.stack([np.eye(LIGHTNESS, k=k).ravel() for k in DIMMER], axis=1).astype(np.float32)
@@ -203,10 +232,13 @@ class Compared:
         weight: ``(n, SLICES)`` float32, how much each slice says: by how much of it shows, how
             colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both.
         alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
+        network: ``(n,)`` float32 log-odds of being the same person by the vectors alone, NaN where
+            either has none.
     """
 
     weight: Floats
     alike: Floats
+    network: Floats
 
     @classmethod
     def of(cls, view: View, looks: Looks) -> Compared:
@@ -216,18 +248,22 @@ class Compared:
         weight[common < LEAST_SLICE] = 0
         # All levels of one against all of the other; the shifts are the diagonals of that.
         cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
-        return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2))
+        return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2), _network(view, looks))
 
     def similarity(self) -> Floats:
-        """How alike the view is to each of the others, ``(n,)``, 0 to 1.
+        """How alike the view is in its colours to each of the others, ``(n,)``, 0 to 1.
 
         The mean over the slices that show in both, at the best of the shifts of lightness; NaN
         where there is none, so that nothing is known.
         """
         return _best(self.weight, self.alike)
 
+    def likeness(self) -> Floats:
+        """``(n, 2)``: :meth:`similarity` and :attr:`network` of each of the others."""
+        return np.stack([self.similarity(), self.network], axis=1)
+
     def of_each(self, starts: Sequence[int]) -> Floats:
-        """How alike the view is to each of several people, ``(p,)``, 0 to 1: to his best view.
+        """The :meth:`likeness` of the view to each of several people, ``(p, 2)``: to his best view.
 
         NaN where no slice of his shows in both, so that nothing is known.
 
@@ -243,8 +279,18 @@ class Compared:
         whose = np.repeat(np.arange(len(starts)), np.diff([*starts, len(shows)]))
         weight = np.where(shows, self.weight, most[whose])
         alike = np.where(shows[..., None], self.alike, best[whose])
-        found: Floats = np.maximum.reduceat(_best(weight, alike), starts)
-        return found
+        found = np.maximum.reduceat(_best(weight, alike), starts)
+        return np.stack([found, np.fmax.reduceat(self.network, starts)], axis=1)
+
+
+def _network(view: View, looks: Looks) -> Floats:
+    """See :attr:`Compared.network`."""
+    described = view.described
+    if described is None or not looks.vectors.shape[1]:
+        return np.full(len(looks), np.nan, np.float32)
+    cosines = looks.vectors @ described.vector
+    odds: Floats = (cosines - np.float32(described.even)) * np.float32(described.steepness)
+    return odds
 
 
 def _best(weight: Floats, alike: Floats) -> Floats:
@@ -261,7 +307,9 @@ def similarity(view: View, looks: Looks) -> Floats:
     return Compared.of(view, looks).similarity()
 
 
-def look_log_odds(alike: float, area: float, views: int = 1, grey: bool = False) -> float:
+def look_log_odds(
+    alike: float, area: float, views: int = 1, grey: bool = False, network: float = math.nan
+) -> float:
     """Log-odds that a view is of the person, from its likeness to the most alike view of his.
 
     Args:
@@ -270,9 +318,13 @@ def look_log_odds(alike: float, area: float, views: int = 1, grey: bool = False)
             whichever is less.
         views: how many views of his it was compared with.
         grey: whether the camera sees no colours.
+        network: see :attr:`Compared.network`.
     """
     even = (EVEN_GREY if grey else EVEN) + EVEN_PER_VIEW * math.log2(views)
     odds = STEEPNESS * (alike - even)
+    if not math.isnan(network):
+        odds = BESIDE_NETWORK * odds
+        odds += min(network - NETWORK_PER_VIEW * math.log2(views), NETWORK_SAME)
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
     told = min(1.0, area / (TELLING_AREA if odds > 0 else WHOLE_AREA))
     most = SUREST_PART + (SUREST_SAME - SUREST_PART) * told
@@ -333,7 +385,7 @@ class Gallery:
         """Whether one of the views shows all of him."""
         return self._largest >= WHOLE_AREA
 
-    def log_odds(self, view: View, alike: float | None = None) -> float:
+    def log_odds(self, view: View, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
 
         Args:
@@ -341,7 +393,7 @@ class Gallery:
             alike: its likeness to the person, see :meth:`Compared.of_each`, where that is known.
         """
         if self.looks is not None and alike is None:
-            alike = float(Compared.of(view, self.looks).of_each([0])[0])
+            alike = Compared.of(view, self.looks).of_each([0])[0].tolist()
         return self._log_odds(view, alike, len(self.views))
 
     def log_odds_before(self, time: float, view: View, alike: Floats) -> float | None:
@@ -350,16 +402,17 @@ class Gallery:
         Args:
             time: seconds.
             view: the view.
-            alike: its likeness to each of the gallery, ``(n,)``.
+            alike: its :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
         """
         old = alike[np.array(self._learned) < time]
-        return self._log_odds(view, float(np.fmax.reduce(old)), len(old)) if len(old) else None
+        return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
 
-    def _log_odds(self, view: View, alike: float | None, views: int) -> float:
+    def _log_odds(self, view: View, alike: Sequence[float] | None, views: int) -> float:
         odds = height_log_odds(view.top, self.top)
-        if alike is None or math.isnan(alike):
+        if alike is None or math.isnan(alike[0]):
             return odds
-        look = look_log_odds(alike, min(view.total, self._largest), views, view.grey)
+        area = min(view.total, self._largest)
+        look = look_log_odds(alike[0], area, views, view.grey, alike[1])
         return odds + (max(look, 0.0) if self.mixed else look)
 
     @classmethod
