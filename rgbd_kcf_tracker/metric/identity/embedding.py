@@ -82,15 +82,13 @@ class Onnx:
             raise ParameterError(f'parameter embedding: there is no file {path!r}')
         try:
             self._net = cv2.dnn.readNetFromONNX(path)
-            size = self._run(np.zeros((HEIGHT, WIDTH, 3), np.uint8)).size
+            self._run(np.zeros((HEIGHT, WIDTH, 3), np.uint8))
         except (cv2.error, ValueError) as error:
             said = getattr(error, 'err', str(error))
             raise ParameterError(
                 f'parameter embedding: OpenCV {cv2.__version__} cannot run {path!r} on pictures of '
                 f'(1, 3, {HEIGHT}, {WIDTH}): {said}'
             ) from None
-        if size < 2:
-            raise ParameterError(f'parameter embedding: {path!r} gives no vector for a picture')
 
     def describe(self, frame: Frame, boxes: Sequence[Box]) -> npt.ArrayLike:
         """See :class:`Embedding`."""
