@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar, cast
@@ -42,7 +43,8 @@ class ParameterInfo:
         minimum, maximum: inclusive range of a number, None where open.
         choices: allowed values of a string, empty where any is.
         source: where the default comes from (thesis section, paper, or 'ours').
-        file: whether a text is the path of a file, or empty for none.
+        file: whether a text is the path of a file, or empty for none; of a command line it is made
+            absolute, as a run may go on elsewhere.
     """
 
     name: str
@@ -134,7 +136,8 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
     An integer is taken for a float (``1`` for ``1.0``); nothing else is converted.
 
     Raises:
-        ParameterError: for the wrong type, a number out of range, or a string that is no choice.
+        ParameterError: for the wrong type, a number out of range, a string that is no choice, or a
+            file that is not there.
     """
     if info.type is float and isinstance(value, int) and not isinstance(value, bool):
         try:
@@ -155,6 +158,8 @@ def checked(info: ParameterInfo, value: object) -> Scalar:
         raise ParameterError(
             f'parameter {info.name} is {value!r}: choose one of {", ".join(info.choices)}'
         )
+    if info.file and value and not os.path.isfile(cast(str, value)):
+        raise ParameterError(f'parameter {info.name}: there is no file {value!r}')
     return cast(Scalar, value)
 
 
@@ -166,6 +171,8 @@ def parsed(info: ParameterInfo, text: Scalar) -> Scalar:
     """
     if not isinstance(text, str):
         return checked(info, text)
+    if info.file and text:
+        text = os.path.abspath(text)
     if info.type is bool:
         lowered = text.strip().lower()
         if lowered not in ('true', 'false'):

@@ -87,17 +87,27 @@ def default_parameters(name: str) -> Parameters:
     return _variant(name).parameters()
 
 
-def create_tracker(variant: str = DEFAULT_VARIANT, parameters: Parameters | None = None) -> Tracker:
-    """A tracker by its variant's name, with the released defaults or the given parameters.
+def fitting_parameters(variant: str, parameters: Parameters | None) -> Parameters:
+    """The given parameters, or the released defaults of a variant.
 
     Raises:
         ParameterError: for an unknown variant, or parameters of another one.
     """
     chosen = _variant(variant)
     if parameters is None:
-        parameters = chosen.parameters()
+        return chosen.parameters()
     if not isinstance(parameters, chosen.parameters):
         raise ParameterError(
             f'variant {variant} takes {chosen.parameters.__name__}, not {type(parameters).__name__}'
         )
-    return chosen.make(parameters)
+    return parameters
+
+
+def create_tracker(variant: str = DEFAULT_VARIANT, parameters: Parameters | None = None) -> Tracker:
+    """A tracker by its variant's name, with the released defaults or the given parameters.
+
+    Raises:
+        ParameterError: for an unknown variant, parameters of another one, or a network that they
+            name and that cannot be run.
+    """
+    return _variant(variant).make(fitting_parameters(variant, parameters))

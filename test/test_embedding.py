@@ -6,25 +6,22 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from onnx_files import average_pool
-from people_rig import RED, Someone, picture
+from people_rig import GREEN, RED, Someone, picture
 
 from rgbd_kcf_tracker import Box, Frame
-from rgbd_kcf_tracker.errors import ParameterError
-from rgbd_kcf_tracker.metric.identity.embedding import (
-    ALONE,
-    DEVIATION,
-    FRESH,
-    MEAN,
-    Described,
-    Describer,
-    Onnx,
-)
+from rgbd_kcf_tracker.errors import DatasetError, ParameterError
+from rgbd_kcf_tracker.evaluation import embedding_fit
+from rgbd_kcf_tracker.evaluation.embedding_fit import Told, fit
+from rgbd_kcf_tracker.evaluation.identity import Seen, Sighting, Views, pair
+from rgbd_kcf_tracker.metric.identity.describer import ALONE, FRESH, Describer
+from rgbd_kcf_tracker.metric.identity.embedding import DEVIATION, MEAN, Described, Onnx
 from rgbd_kcf_tracker.metric.identity.gallery import (
     BESIDE_NETWORK,
     EVEN,
@@ -40,6 +37,8 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 )
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.targets import MetricTracker
+from rgbd_kcf_tracker.parameters import files_named, with_overrides
+from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.targets import TargetSet
 
 BOX = Box(10, 20, 40, 80)
@@ -99,18 +98,41 @@ def test_boxes_at_the_images_sides_and_of_one_pixel_are_described(network: str, 
 
 
 def test_a_file_that_is_no_network_for_pictures_of_people_is_refused_by_its_name(tmp_path: Path):
-    none, text = tmp_path / 'none.onnx', tmp_path / 'text.onnx'
+    text = tmp_path / 'text.onnx'
     text.write_text('no network')
-    for path, why in ((none, 'there is no file'), (text, 'cannot run')):
-        with pytest.raises(ParameterError, match=f'parameter embedding: .*{why}') as error:
-            Onnx(str(path), 0.5, 12.0)
-        assert str(path) in str(error.value)
+    for parameters in (MetricParameters(embedding=str(text)),):
+        for make in (MetricTracker, lambda p: TargetSet('metric', p)):
+            with pytest.raises(
+                ParameterError, match=r"embedding: OpenCV .* cannot run '.*text\.onnx"
+            ):
+                make(parameters)
 
 
-@pytest.mark.parametrize('make', [MetricTracker, lambda p: TargetSet('metric', p)])
-def test_a_tracker_with_a_network_that_is_not_there_is_not_made(make):
-    with pytest.raises(ParameterError, match=r"no file '/nowhere\.onnx'"):
-        make(MetricParameters(embedding='/nowhere.onnx'))
+def test_a_network_that_is_not_there_is_no_parameter(tmp_path: Path, monkeypatch):
+    with pytest.raises(
+        ParameterError, match=r"parameter embedding: there is no file '/none\.onnx'"
+    ):
+        MetricParameters(embedding='/none.onnx')
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ParameterError, match='there is no file'):
+        with_overrides(MetricParameters(), {'embedding': 'means.onnx'})
+    (tmp_path / 'means.onnx').write_bytes(average_pool())
+    given = with_overrides(MetricParameters(), {'embedding': 'means.onnx'})
+    assert given.embedding == str(tmp_path / 'means.onnx'), 'a run may go on in another folder'
+    assert files_named(given) == [given.embedding]
+    assert files_named(MetricParameters()) == []
+
+
+def test_a_set_that_begins_anew_does_not_read_its_network_again(network: str):
+    targets = TargetSet('metric', MetricParameters(embedding=network))
+    Path(network).unlink()
+    again = targets.anew()
+    again.everyone = True
+    for i in range(8):
+        again.update(picture([Someone(-0.9 + 0.1 * i, 3.0)] if i > 2 else [], 0.1 * i))
+    assert again.metric is not None
+    (person,) = again.metric._crowd.people
+    assert person.gallery.views[0].described is not None
 
 
 def test_only_metric_takes_an_embedding():
@@ -125,11 +147,15 @@ def test_who_stands_alone_is_described_now_and_then_and_who_may_be_mistaken_in_e
     embedding = Fixed(None)
     describer = Describer(embedding)
     describer.frame = plain((0, 0, 0))
+    red, green = view_of(Someone(0.0, 3.0, RED), None), view_of(Someone(0.0, 3.0, GREEN), None)
 
-    def asked(time: float, *places: float) -> int:
+    def asked(time: float, *places: float, first: View = red) -> int:
         embedding.asked.clear()
         at = np.array([[place, 3.0] for place in places])
-        assert len(describer.describe_all([BOX] * len(at), at, time)) == len(at)
+        views = [first] + [red] * (len(at) - 1)
+        told = describer.everybody(views, [BOX] * len(at), at, time)
+        assert [view.described is not None for view in told] == [True] * len(at)
+        assert all(a.roots is b.roots for a, b in zip(told, views, strict=True))
         return sum(len(each) for each in embedding.asked)
 
     assert asked(0.0, 0.0, 3.0) == 2
@@ -139,25 +165,68 @@ def test_who_stands_alone_is_described_now_and_then_and_who_may_be_mistaken_in_e
     assert asked(0.4, 0.05, 3.0, -2.0) == 1, 'somebody comes'
     assert asked(0.3 + FRESH, 0.05, 3.0, -2.0) == 2
     assert asked(0.3 + 3 * FRESH, 0.05, 3.0) == 2
+    assert asked(0.4 + 3 * FRESH, 0.05, 3.0, first=green) == 1, (
+        'who stands there now looks otherwise'
+    )
+    describer.forget()
+    assert asked(0.5 + 3 * FRESH, 0.05, 3.0, first=green) == 2
+
+
+def test_before_a_camera_that_moves_everybody_is_described_in_each_frame():
+    """Who was at a place of the last picture is elsewhere in this one."""
+    asked = {}
+    for turn in (0.0, 0.05):
+        embedding = Fixed(None)
+        targets = TargetSet('metric', embedding=embedding)
+        targets.everyone = True
+        one = Someone(0.0, 3.0)
+        for i in range(12):
+            rotation = np.array(
+                [
+                    [np.cos(turn * i), 0, np.sin(turn * i)],
+                    [0, 1, 0],
+                    [-np.sin(turn * i), 0, np.cos(turn * i)],
+                ]
+            )
+            pose = Pose(rotation, np.zeros(3))
+            targets.update(picture([one] if i > 3 else [], 0.1 * i, pose=pose))
+        asked[turn] = len(embedding.asked)
+    assert asked[0.05] > asked[0.0] > 0
 
 
 def test_vectors_have_length_one_whatever_the_network_gives():
     describer = Describer(Fixed([[3.0, 4.0], [0.0, 1e-3]]))
     describer.frame = plain((0, 0, 0))
-    one, other = describer.describe([BOX, BOX])
-    assert one.vector == pytest.approx([0.6, 0.8])
-    assert other.vector == pytest.approx([0.0, 1.0])
-    assert (one.even, one.steepness) == (0.5, 12.0)
+    view = view_of(Someone(0.0, 3.0), None)
+    one, other = describer.described([view, view], [BOX, BOX])
+    assert one.described is not None
+    assert other.described is not None
+    assert one.described.vector == pytest.approx([0.6, 0.8])
+    assert other.described.vector == pytest.approx([0.0, 1.0])
+    assert (one.described.even, one.described.steepness) == (0.5, 12.0)
 
 
-@pytest.mark.parametrize(
-    'bad', [np.ones(3), np.ones((1, 3)), np.zeros((2, 3)), np.full((2, 3), np.nan), np.ones((2, 0))]
-)
-def test_an_embedding_that_gives_no_vector_for_each_box_is_refused(bad: np.ndarray):
-    describer = Describer(Fixed(bad))
+@pytest.mark.parametrize('nothing', [0.0, np.nan, np.inf])
+def test_a_network_may_say_nothing_of_somebody(nothing: float):
+    """As one whose last step cuts off what is negative does of a dark picture."""
+    describer = Describer(Fixed([[nothing, nothing], [1.0, 0.0]]))
     describer.frame = plain((0, 0, 0))
-    with pytest.raises(ParameterError, match='a finite vector, not 0, for each of 2 boxes'):
-        describer.describe([BOX, BOX])
+    view = view_of(Someone(0.0, 3.0), None)
+    one, other = describer.everybody([view, view], [BOX, BOX], np.array([[0, 3.0], [2, 3.0]]), 0.0)
+    assert one.described is None
+    assert other.described is not None
+
+
+@pytest.mark.parametrize('bad', [np.ones(3), np.ones((1, 3)), np.ones((2, 0)), np.ones((2, 4))])
+def test_an_embedding_that_gives_no_vector_for_each_box_is_refused(bad: np.ndarray):
+    embedding = Fixed(np.ones((2, 3)))
+    describer = Describer(embedding)
+    describer.frame = plain((0, 0, 0))
+    view = view_of(Someone(0.0, 3.0), None)
+    describer.described([view, view], [BOX, BOX])
+    embedding.vectors = bad
+    with pytest.raises(ParameterError, match=r'a vector for each of 2 boxes, .*: \(2, 3\) numbers'):
+        describer.described([view, view], [BOX, BOX])
 
 
 # -- weighing it ----------------------------------------------------------------------------------
@@ -319,3 +388,90 @@ def test_a_network_named_by_a_parameter_is_asked_and_the_boxes_of_one_alone_are_
         assert all((view.described is not None) == bool(path) for view in person.gallery.views)
         answers.append([track.box for track in tracks])
     assert answers[0] == answers[1]
+
+
+def test_a_part_of_somebody_is_judged_by_what_the_network_says_of_all_of_him():
+    """By its colours alone it was the target at 4 log-odds, he himself at less than even ones."""
+    walks = Walks()
+    targets = TargetSet('metric', embedding=walks.truth)
+    targets.everyone = True
+    for frame, _ in walks(count=4):
+        targets.update(frame)
+    for frame, _ in walks('a', -0.9, 0.9):
+        targets.update(frame)
+    assert targets.metric is not None
+    for _ in range(30):
+        for frame, _ in walks(count=1):
+            targets.update(frame)
+    for frame, _ in walks('b', 0.9, 0.0):
+        targets.update(frame)
+    account = targets.metric.account
+    assert account is not None
+    (sight,) = account.sights
+    seen = sight.figure.seen
+    upper = dataclasses.replace(seen, mask=seen.mask[: int(0.6 * len(seen.mask))])
+    first = min(targets.metric._crowd.people, key=lambda person: person.number)
+    assert first.gallery.log_odds(account.look(upper)) < 0
+    assert first.gallery.log_odds(account.look(seen)) < 0
+
+
+# -- fitting it -----------------------------------------------------------------------------------
+
+
+def told(even: float, steepness: float, count: int = 4000) -> Told:
+    """Pairs whose cosines say what they are by a line, and whose colours say nothing."""
+    rng = np.random.default_rng(0)
+    cosine = rng.uniform(0, 1, count)
+    same = rng.random(count) < 1 / (1 + np.exp(-steepness * (cosine - even)))
+    ones = np.ones(count)
+    return Told(cosine, np.full(count, np.nan), ones, same, ones)
+
+
+def test_the_line_by_which_pairs_were_drawn_is_found_again():
+    assert fit(told(0.55, 14.0)) == pytest.approx((0.55, 14.0), rel=0.08)
+    assert told(0.55, 14.0).bits(told(0.55, 14.0).odds()) == pytest.approx(1.0), 'nothing is known'
+
+
+@pytest.mark.parametrize('steepness', [0.0, -14.0])
+def test_a_network_that_tells_nothing_is_not_fitted(steepness: float):
+    with pytest.raises(DatasetError, match='the network tells nothing of these people'):
+        fit(told(0.5, steepness))
+
+
+def seen_again(count: int, apart: float = 4.0) -> Seen:
+    """Two in the same clothes, each seen so often; a network tells them apart."""
+    views = [view_of(Someone(0.0, 3.0), vector) for vector in ((1, 0.1), (0.1, 1))]
+    sightings = [
+        Sighting(person, 2 * n + person, round(apart * (2 * n + person) * 1e9), views[person])
+        for n in range(count)
+        for person in (0, 1)
+    ]
+    return Seen('hall', 2 * count, 2 * count, tuple(sightings))
+
+
+def test_pairs_of_one_and_of_two_weigh_the_same_and_few_are_refused():
+    alone = Views(lambda frame, box: None, lambda first, second: 0.5)
+    pairs = Told.of([pair(seen_again(7), None, alone)])
+    assert np.count_nonzero(pairs.same) == 2 * 21
+    assert pairs.weight[pairs.same].sum() == pytest.approx(pairs.weight[~pairs.same].sum())
+    assert pairs.cosine[pairs.same] == pytest.approx(np.ones(42))
+    assert (pairs.cosine[~pairs.same] < 0.3).all()
+    assert pairs.alike == pytest.approx(np.ones(len(pairs.same)), abs=1e-5)
+    with pytest.raises(DatasetError, match=r'2 pairs of sightings are of one person.*30 are'):
+        Told.of([pair(seen_again(2), None, alone)])
+
+
+def test_the_command_prints_the_parameters_for_a_network(network: str, monkeypatch, capsys):
+    seen = seen_again(8)
+    monkeypatch.setattr(embedding_fit, 'open_dataset', lambda name, options: [name])
+    monkeypatch.setattr(embedding_fit, '_seen', lambda sequence, parameters, camera: seen)
+    monkeypatch.setattr('sys.argv', ['embedding_fit', 'hall/', '--embedding', network])
+    assert embedding_fit.main() == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert re.fullmatch(r'embedding_even: 0\.\d\d, embedding_steepness: [\d.]+', first)
+    assert '120 pairs, 56 of them of one person' in second
+    monkeypatch.setattr('sys.argv', ['embedding_fit', 'hall/', '--embedding', '/none.onnx'])
+    assert embedding_fit.main() == 2
+    assert "embedding_fit: error: parameter embedding: there is no file '/none.onnx'" in (
+        capsys.readouterr().err
+    )

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from onnx_files import average_pool
 
 from rgbd_kcf_tracker.batch.workers import LocalPool
 from rgbd_kcf_tracker.errors import DatasetError, ParameterError
@@ -188,13 +189,22 @@ def test_pictures_of_another_rate_do_not_stay(tmp_path: Path):
         assert len(read_thumbnails(path)) == kept
 
 
-def test_a_run_is_made_again_when_a_file_that_its_parameters_name_changes(tmp_path: Path):
-    network = tmp_path / 'people.onnx'
-    network.write_bytes(b'one network')
-    named = Contender('m', 'variant', 'metric', (('embedding', str(network)),))
-    before = [run_key(sequence('a'), named, RunOptions()) for _ in range(2)]
-    network.write_bytes(b'another network')
-    assert len({*before, run_key(sequence('a'), named, RunOptions())}) == 2
+def test_a_run_is_made_again_when_a_file_that_its_parameters_name_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path('one.onnx').write_bytes(average_pool(cell=64))
+
+    def key(path: str) -> str:
+        given = contenders.variant('metric', {'embedding': path})
+        assert dict(given.overrides)['embedding'] == os.path.abspath(path), 'runs go on elsewhere'
+        assert given.name == f'metric embedding={path}'
+        return run_key(sequence('a'), given, RunOptions())
+
+    before = key('one.onnx')
+    assert key('./one.onnx') == before
+    Path('one.onnx').write_bytes(average_pool(cell=32))
+    assert key('one.onnx') != before
 
 
 def test_runs_of_one_name_in_one_folder_are_each_held_against_their_own_truth(tmp_path: Path):

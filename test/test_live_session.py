@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from onnx_files import average_pool
 from people_rig import BLUE, GREEN, Someone, picture
 
 from rgbd_kcf_tracker import Box, Track, TrackState
@@ -280,3 +282,35 @@ def test_an_allowance_lets_some_through_at_once_and_then_a_trickle() -> None:
     assert [allowance.allowed() for _ in range(2)] == [True, False]
     clock[0] += 1000
     assert sum(allowance.allowed() for _ in range(100)) == 10
+
+
+def test_parameters_that_cannot_be_are_said_and_the_last_go_on(tmp_path: Path) -> None:
+    """Each frame ended in an error from then on, and nobody was followed."""
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    run(made, 0, 3)
+    network = tmp_path / 'text.onnx'
+    network.write_text('no network')
+    made.configure('metric', default_parameters('metric').replace(embedding=str(network)))
+    assert [str(network) in said for said in refused] == [True]
+    run(made, 3, 3)
+    assert made.track.box.iou(FIRST.box) > 0.5
+    made.reset()
+    made.choose(lambda _: SECOND.box)
+    run(made, 6, 2)
+    assert made.track.box.iou(SECOND.box) > 0.5
+    assert len(refused) == 1
+
+
+def test_a_network_is_read_once_however_often_one_begins_anew(tmp_path: Path) -> None:
+    network = tmp_path / 'means.onnx'
+    network.write_bytes(average_pool())
+    made, refused, _ = session()
+    made.configure('metric', default_parameters('metric').replace(embedding=str(network)))
+    network.unlink()
+    for box in (FIRST.box, SECOND.box):
+        made.choose(lambda _, box=box: box)
+        run(made, 0, 2)
+        assert made.track.box.iou(box) > 0.5
+        made.reset()
+    assert not refused

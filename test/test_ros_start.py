@@ -81,7 +81,7 @@ def test_what_cannot_be_understood_is_refused(
         ('kcf.learning_rate:=7.5', 'learning_rate is 7.5: it must be between 0 and 1'),
         ('pair_tolerance:="soon"', 'pair_tolerance'),
         ('variant:=3', 'variant'),
-        ('metric.embedding:=/none.onnx', "parameter embedding: there is no file '/none.onnx'"),
+        ('metric.embedding:=/none.onnx', "metric.embedding: there is no file '/none.onnx'"),
         ('variant:=[]', 'parameter variant is an empty list'),
         ('auto_init_far:=0.3', 'auto_init_near is 0.5 and auto_init_far 0.3: nobody is between'),
         ('init_box:="1,2,3"', 'give x,y,width,height'),

@@ -12,13 +12,17 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
+from onnx_files import average_pool
 
 from rgbd_kcf_tracker.batch.workers import LocalPool
 from rgbd_kcf_tracker.cli import track, track_many
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.cli.workers import record
 from rgbd_kcf_tracker.errors import ParameterError, RecordingError
+from rgbd_kcf_tracker.recordings.results import HEADER
 from rgbd_kcf_tracker.recordings.rowfiles import join_csv
 
 WORDS = ['--variant', 'kcf', '--jobs', '1']
@@ -143,6 +147,33 @@ def test_results_of_other_options_are_not_replaced_unasked(
     assert main([*words, '--output', str(tmp_path / 'out')]) == 2
     assert 'normal_0.csv and 3 more would be replaced' in capsys.readouterr().err
     assert results(tmp_path / 'out') == before
+
+
+def test_results_of_another_network_of_the_same_name_are_not_taken_for_ones_own(
+    recordings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    Path('net.onnx').write_bytes(average_pool(cell=64))
+    words = ['track', f'{recordings}/normal_*', '--end', '3', '--output', 'out', '--param']
+    for name in ('net.onnx', './net.onnx'):
+        assert main([*words, f'embedding={name}']) == 0
+    Path('net.onnx').write_bytes(average_pool(cell=32))
+    assert main([*words, 'embedding=net.onnx']) == 2
+    assert 'normal_0.csv and 1 more would be replaced' in capsys.readouterr().err
+
+
+def test_a_recording_in_which_nobody_is_seen_has_a_file_of_no_rows(tmp_path: Path, capsys):
+    """Its file was not there, so that it failed; of one recording it was said to be written."""
+    for name in ('wall', 'door'):
+        (tmp_path / name / 'rgb').mkdir(parents=True)
+        cv2.imwrite(str(tmp_path / name / 'rgb' / '0.png'), np.full((90, 120, 3), 90, np.uint8))
+    words = ['track', '--all', str(tmp_path / 'wall')]
+    assert main([*words, '--output', str(tmp_path / 'one.csv')]) == 0
+    assert 'nobody' in capsys.readouterr().out
+    assert main([*words, str(tmp_path / 'door'), '--output', str(tmp_path / 'out')]) == 0
+    for path in (tmp_path / 'one.csv', tmp_path / 'out' / 'tracks' / 'wall.csv'):
+        assert path.read_text() == ','.join(('id', *HEADER)) + '\n'
+    assert len(rows_of(tmp_path / 'out' / 'sources.csv')) == 2
 
 
 def test_lists_globs_and_repeats(recordings: Path, tmp_path: Path, monkeypatch):

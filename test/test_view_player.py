@@ -355,6 +355,9 @@ def test_what_cannot_be_done_is_said_and_nothing_ends() -> None:
     assert 'outside' in rig.ask('point', x=-4.0, y=0.0, frame=0)['word']
     assert 'nothing' in rig.ask('parameter', name='nothing', value=1)['word']
     assert 'between' in rig.ask('parameter', name='acceptance', value=7.0)['word']
+    # Who sees the page is not to have files of this machine opened.
+    told = rig.ask('parameter', name='embedding', value='/etc/hostname')['word']
+    assert 'name a file where the page is started: --param embedding=' in told
     assert 'unknown variant' in rig.ask('variant', name='mosse')['word']
     assert rig.ask('box', x=0.0, y=0.0, width=0.0, height=5.0, frame=0)['word']
     assert rig.ask('seek', frame=5)['targets'][0]['state'] == 'tracking'

@@ -137,12 +137,16 @@ def _run_in(
 ) -> int:
     """Follow through recordings, into folders that are there; returns the exit code."""
     from rgbd_kcf_tracker.batch.loop import run_all
+    from rgbd_kcf_tracker.cli.common import tracker_parameters
+    from rgbd_kcf_tracker.parameters import files_named
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
 
     tables = [folders['output'] / name for name in (SOURCES, f'tracks.{args.table or TABLES[0]}')]
     _refuse_to_write(own, [*tables, folders['output'] / RECORD], read)
     needs = list(dict.fromkeys(Path(job.source).parent for job in own))
     with open_workers(args, needs, list(folders.values())) as workers:
-        own = _identified(own, None if args.cluster is None else workers)
+        named = files_named(tracker_parameters(args, args.variant or DEFAULT_VARIANT))
+        own = _identified(own, None if args.cluster is None else workers, named)
         todo = [job for job in own if not _is_done(folders['output'], job)]
         if not args.overwrite:
             _refuse_to_replace(todo, tables, {job.name for job in jobs})
@@ -297,9 +301,10 @@ def _job(args: argparse.Namespace, source: str, name: str, folders: dict[str, Pa
 def _check_parameters(args: argparse.Namespace) -> None:
     """Mistakes that every recording would stumble on are told once, before any of them."""
     from rgbd_kcf_tracker.cli import track
-    from rgbd_kcf_tracker.cli.common import parse_box, read_options
+    from rgbd_kcf_tracker.cli.common import parse_box, read_options, with_whole_paths
 
     track.make_follower(args)
+    args.param = with_whole_paths(args.param)
     for text in args.init:
         parse_box(text)
     read_options(args)
@@ -308,15 +313,22 @@ def _check_parameters(args: argparse.Namespace) -> None:
 # --- one recording
 
 
-def _identified(jobs: list[TrackJob], workers: Any) -> list[TrackJob]:
-    """The jobs with their keys: content of the recording, options, code and libraries."""
+def _identified(jobs: list[TrackJob], workers: Any, named: list[str]) -> list[TrackJob]:
+    """The jobs with their keys: content of the recording, options, code and libraries.
+
+    Args:
+        jobs: the jobs.
+        workers: who reads the recordings; None for this process.
+        named: files that the tracker's parameters name.
+    """
     from rgbd_kcf_tracker.batch.content import files_digest
     from rgbd_kcf_tracker.batch.digests import digests
     from rgbd_kcf_tracker.batch.environment import environment
     from rgbd_kcf_tracker.cli import track
 
     content = digests({job.name: (Path(job.source),) for job in jobs}, workers)
-    code = [environment().digest, files_digest([Path(track.__file__)])]
+    read = [Path(track.__file__), *map(Path, named)]
+    code = [environment().digest, files_digest(read)]
     found = []
     for job in jobs:
         options = {name: job.options[name] for name in _OPTIONS if name in job.options}

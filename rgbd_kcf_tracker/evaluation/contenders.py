@@ -52,7 +52,10 @@ class Contender:
         """Changes whenever the tracker would behave otherwise by its parameters."""
         values: Any = ''
         if self.kind == 'variant':
-            values = dataclasses.asdict(self.parameters())
+            parameters = self.parameters()
+            values = dataclasses.asdict(parameters)
+            # Where a file lies is of a machine: its content is in the key of a run.
+            values |= dict.fromkeys((i.name for i in describe(type(parameters)) if i.file), '')
         elif self.kind == 'opencv':
             values = cv2.__version__
         return json.dumps([self.kind, self.source, values], sort_keys=True)
@@ -151,6 +154,10 @@ def variant(name: str, overrides: Mapping[str, str] | None = None) -> Contender:
         pairs = tuple(sorted((overrides or {}).items()))
         label = ' '.join([name, *(f'{k}={v}' for k, v in pairs)])
         contender = Contender(label, 'variant', name, pairs)
+        given = contender.parameters()
+        files = {info.name for info in describe(type(given)) if info.file}
+        full = tuple((k, getattr(given, k) if k in files else v) for k, v in pairs)
+        contender = dataclasses.replace(contender, overrides=full)
     contender.make()
     return contender
 

@@ -89,7 +89,7 @@ class Session:
     ) -> None:
         self._variant, self._parameters = variant, parameters
         self._wanted = (variant, parameters)
-        self._targets = TargetSet(variant, parameters)
+        self._targets = self._empty = TargetSet(variant, parameters)
         self._everyone = False
         self._chosen: int | None = None
         self._added: list[int] = []
@@ -241,12 +241,20 @@ class Session:
     def _renew(self) -> None:
         """Begin anew with what is wanted."""
         self.track = IDLE
-        self._replace(TargetSet(*self._wanted))
+        self._replace(self._empty.anew())
         self._story.restart()
 
     def configure(self, variant: str, parameters: Parameters) -> None:
-        """Use another tracker or other parameters, as soon as no hidden target would be lost."""
+        """Use another tracker or other parameters, as soon as no hidden target would be lost.
+
+        Where that cannot be, it is said, and the last goes on.
+        """
         if self._wanted == (variant, parameters):
+            return
+        try:
+            self._empty = TargetSet(variant, parameters)
+        except RgbdKcfError as error:
+            self._report(str(error))
             return
         self._wanted = (variant, parameters)
         if not self.following:
@@ -336,7 +344,7 @@ class Session:
         Alone, it starts with nothing remembered; among others, with what is known of all.
         """
         among = self._added or self._targets.everyone
-        targets = self._targets if among else TargetSet(*self._wanted)
+        targets = self._targets if among else self._empty.anew()
         try:
             inner = targets.add(frame, box)
         except RgbdKcfError as error:
@@ -425,7 +433,7 @@ class Session:
         if self._chosen is not None and not _shown(self.track, frame):
             return
         asked = self.asked_for
-        targets = TargetSet(*self._wanted)
+        targets = self._empty.anew()
         everyone = self._everyone and targets.metric is not None
         ids: dict[int, int] = {}
         try:
@@ -436,6 +444,7 @@ class Session:
         except RgbdKcfError as error:
             self._report(str(error))
             self._wanted = (self._variant, self._parameters)
+            self._empty = self._targets
             return
         for inner, number in ids.items():
             if number not in asked:  # known from now on, by that id, and followed with everyone

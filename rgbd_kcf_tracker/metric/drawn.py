@@ -13,7 +13,6 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import SAME_DEPTH, ByLook
 from rgbd_kcf_tracker.metric.decide.account import STATURE, Account
-from rgbd_kcf_tracker.metric.identity.embedding import Described
 from rgbd_kcf_tracker.metric.identity.gallery import LEAST_PIXELS, SLICES, Gallery, View
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -36,13 +35,7 @@ nine of ten boxes on walls and doors beyond depth's reach, and hardly any on peo
 (docs/experiments.md)."""
 
 
-def view_in(
-    scene: Scene,
-    box: Box,
-    look: ByLook,
-    depth: float | None = None,
-    described: Described | None = None,
-) -> View | None:
+def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) -> View | None:
     """How somebody looks of whom depth shows nothing: the pixels in a box that have his colours.
 
     What is read there at another depth is what he stands before.
@@ -56,7 +49,6 @@ def view_in(
         box: about him, in pixels of the image.
         look: that follows him.
         depth: metres; None where that is not known: then as far off as who is of mean height.
-        described: how a network describes what is in the box, where one was asked.
 
     Returns:
         None where that cannot be said: his head is not in the image, or it is not known how far off
@@ -79,8 +71,7 @@ def view_in(
     if np.count_nonzero(mask) < LEAST_PIXELS:
         return None
     seen = Silhouette(cols.start, rows.start, mask, 0, depth, 0.0, Sides(), (0.0,) * 4)
-    above = max(-b.y, 0.0) * depth / k.fy
-    return View.of(view, scene.codes, seen, None, above, described)
+    return View.of(view, scene.codes, seen, None, max(-b.y, 0.0) * depth / k.fy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,7 +96,7 @@ class Drawn:
     def of(cls, account: Account, box: Box, look: ByLook) -> Drawn | None:
         """Take what a box of a frame shows; None where :func:`view_in` gives nothing."""
         scene = account.scene
-        seen = view_in(scene, box, look, described=account.described(box))
+        seen = view_in(scene, box, look)
         if seen is None:
             return None
         view, b = scene.view, box.over(scene.view.step)
@@ -115,7 +106,8 @@ class Drawn:
         alone = np.count_nonzero(about) < TOUCHED * about.size
         whole = bool(alone) and not scene.ends(box).any
         telling = look.unread and b.area >= FEW
-        return cls(Gallery.of(seen, account.time), scene.axes @ np.array(middle), whole, telling)
+        known = Gallery.of(account.described(seen, box), account.time)
+        return cls(known, scene.axes @ np.array(middle), whole, telling)
 
     def unlike(self, view: View) -> bool:
         """Whether a figure does not look as he does: said if all of him was drawn, and large."""

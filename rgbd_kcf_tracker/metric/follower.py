@@ -240,9 +240,8 @@ class Follower:
         cut = seen.cut.top or seen.cut.left or seen.cut.right
         hidden = cut and person.gallery.top is None
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
-            described = person.gallery.views[0].described
-            known = View.of(view, account.scene.codes, seen, None, above, described)
-            person.gallery = Gallery.of(known, account.time)
+            known = View.of(view, account.scene.codes, seen, None, above)
+            person.gallery = Gallery.of(account.described(known, box), account.time)
 
     def _know_as_drawn(self, account: Account, box: Box, look: ByLook) -> None:
         """Know by his box, too, of whom depth shows little where its view ends."""
@@ -251,9 +250,10 @@ class Follower:
             return
         if np.count_nonzero(seen.mask) > LEAST_KNOWN * box.over(account.scene.view.step).area:
             return
-        known = view_in(account.scene, box, look, seen.depth, account.described(box))
+        known = view_in(account.scene, box, look, seen.depth)
         if known is None or len(person.gallery.views) != 1:
             return
+        known = account.described(known, box)
         person.gallery.learn(known, account.time)
         if len(person.gallery.views) == 1:  # they say the same, and the box says more
             person.gallery = Gallery.of(known, account.time)

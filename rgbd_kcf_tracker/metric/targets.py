@@ -22,7 +22,8 @@ from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import LEARNED, Follower
-from rgbd_kcf_tracker.metric.identity.embedding import Describer, Embedding, Onnx
+from rgbd_kcf_tracker.metric.identity.describer import Describer
+from rgbd_kcf_tracker.metric.identity.embedding import Embedding, Onnx
 from rgbd_kcf_tracker.metric.identity.middle import (
     in_metres,
     row_by_row,
@@ -81,7 +82,7 @@ class MetricTargets:
     ) -> None:
         self._parameters = parameters
         self._cues = cues
-        self._embedding = embedding or _network(parameters)
+        self._embedding = network_of(parameters) if embedding is None else embedding
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
         self._reader, self._crowd = self._new_memory(first)
@@ -428,8 +429,12 @@ class MetricTargets:
         return tracks
 
 
-def _network(parameters: MetricParameters) -> Embedding | None:
-    """The network that parameters name, if they do."""
+def network_of(parameters: MetricParameters) -> Embedding | None:
+    """The network that parameters name, if they do.
+
+    Raises:
+        ParameterError: where it cannot be run.
+    """
     p = parameters
     if not p.embedding:
         return None
@@ -455,7 +460,7 @@ class MetricTracker:
         embedding: Embedding | None = None,
     ) -> None:
         self._parameters, self._cues = parameters, cues
-        self._embedding = embedding or _network(parameters)
+        self._embedding = network_of(parameters) if embedding is None else embedding
         self._targets: MetricTargets | None = None
         self._number = 0
 

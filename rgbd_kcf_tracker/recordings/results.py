@@ -48,7 +48,7 @@ class TrackCsvWriter(FrameWriter):
 
     def __init__(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         self.output = None if os.fspath(path) == '-' else OutputFile(path, overwrite)
-        self._rows = 0
+        self._frames = 0
         try:
             self._write(self._header)
         except BaseException:
@@ -62,10 +62,10 @@ class TrackCsvWriter(FrameWriter):
             RecordingError: where it cannot be written.
         """
         self._write(row(number, stamp_ns, track))
-        self._rows += 1
+        self._frames += 1
 
     def close(self, whole: bool = True) -> None:
-        """Close the file; one without a row is removed.
+        """Close the file; one of no frame is removed.
 
         Args:
             whole: all rows are written: only then does it replace another.
@@ -74,7 +74,7 @@ class TrackCsvWriter(FrameWriter):
             RecordingError: where it cannot be written.
         """
         if self.output is not None:
-            self.output.end(whole=whole, anything=self._rows > 0)
+            self.output.end(whole=whole, anything=self._frames > 0)
 
     def _write(self, line: str) -> None:
         if self.output is not None:
@@ -102,4 +102,4 @@ class TracksCsvWriter(TrackCsvWriter):
         """
         for who, track in sorted(tracks.items()):
             self._write(f'{who},{row(number, stamp_ns, track)}')
-            self._rows += 1
+        self._frames += 1

@@ -446,6 +446,8 @@ class Player:
         info = next((i for i in describe(type(self._parameters)) if i.name == name), None)
         if info is None:
             raise ParameterError(f'{self._variant} has no parameter {name!r}')
+        if info.file:  # whoever sees the page is not to read what lies on this machine
+            raise ParameterError(f'{name}: name a file where the page is started: --param {name}=')
         self._reconfigure(self._variant, self._parameters.replace(**{name: checked(info, value)}))
 
     def _reconfigure(self, variant: str, parameters: Parameters) -> None:

@@ -17,9 +17,8 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
-from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
-from rgbd_kcf_tracker.metric.identity.embedding import Described, Describer
+from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
@@ -203,19 +202,17 @@ class Account:
         for sight in self.sights:
             if sight.figure.seen.same(seen):
                 return sight.view
-        return look_of(self.scene, seen)
+        view = look_of(self.scene, seen)
+        index = -1 if self.describer is None else self.sight_of(seen)
+        if index >= 0 and not self.sights[index].figure.parted:  # a part of whom it describes
+            return replace(view, described=self.sights[index].view.described)
+        return view
 
-    def described(self, box: Box) -> Described | None:
-        """How a network describes what is in a box of the frame; None without one."""
-        return None if self.describer is None else self.describer.describe([box])[0]
-
-    def to_learn(self, seen: Silhouette, view: View) -> View:
-        """The look of a silhouette with all that can be told of it."""
+    def described(self, view: View, box: Box) -> View:
+        """A view with what a network says of its box, if there is one and it has not yet."""
         if self.describer is None or view.described is not None:
             return view
-        index = self.sight_of(seen)
-        known = self.sights[index].view.described if self._is_nearly(seen, index) else None
-        return replace(view, described=known or self.described(box_about(self.scene, seen)))
+        return self.describer.described([view], [box])[0]
 
     def _is_nearly(self, seen: Silhouette, index: int) -> bool:
         """Whether hardly anything of a sight is missing in a silhouette that is part of it."""
@@ -367,15 +364,10 @@ class Account:
         return mask
 
 
-def look_of(scene: Scene, seen: Silhouette, described: Described | None = None) -> View:
+def look_of(scene: Scene, seen: Silhouette) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
     That is where the image ends below it, or depth does beside the upper end of what shows.
-
-    Args:
-        scene: of the frame.
-        seen: the silhouette.
-        described: how a network describes it, where one was asked.
     """
     highest, above = seen.highest(scene.elevation), 0.0
     top = None if seen.cut.top else highest
@@ -387,7 +379,7 @@ def look_of(scene: Scene, seen: Silhouette, described: Described | None = None) 
         least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
         if highest is not None and least < highest < most:
             above = STATURE - highest
-    return View.of(scene.view, scene.codes, seen, top, above, described)
+    return View.of(scene.view, scene.codes, seen, top, above)
 
 
 def absent(gone: float, misses: int) -> bool:

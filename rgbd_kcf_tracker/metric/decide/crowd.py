@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 from functools import lru_cache
 
 import numpy as np
@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.metric.decide.stayed import stayed
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
-from rgbd_kcf_tracker.metric.identity.embedding import Described, Describer
+from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
@@ -255,13 +255,14 @@ class Crowd:
 
     def _sights(self, scene: Scene, figures: list[Figure], time: float) -> list[Sight]:
         """The look of each figure, described where there is a network."""
-        described: Sequence[Described | None] = [None] * len(figures)
+        views = [look_of(scene, figure.seen) for figure in figures]
         if self._describer is not None and figures:
+            if scene.motion is not None:
+                self._describer.forget()
             boxes = [box_about(scene, figure.seen) for figure in figures]
             places = np.stack([figure.place for figure in figures])
-            described = self._describer.describe_all(boxes, places, time)
-        pairs = zip(figures, described, strict=True)
-        return [Sight(figure, look_of(scene, figure.seen, said)) for figure, said in pairs]
+            views = self._describer.everybody(views, boxes, places, time)
+        return [Sight(figure, view) for figure, view in zip(figures, views, strict=True)]
 
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float

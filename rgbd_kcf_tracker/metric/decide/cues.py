@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Further cues of whoever has some, as the likeness of a network's embeddings."""
+"""Further cues of whoever has some, beside how people look."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Gallery
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
@@ -91,7 +92,8 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     if view.top is not None and view.top > 1.2:
         person.gallery.learn_height(view.top, account.time)
     if whole or not person.gallery.views:
-        person.gallery.learn(account.to_learn(seen, view), account.time)
+        described = account.described(view, box_about(scene, seen))
+        person.gallery.learn(described, account.time)
 
 
 def _came(scene: Scene, seen: Silhouette) -> bool:

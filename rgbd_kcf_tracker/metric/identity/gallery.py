@@ -56,7 +56,8 @@ the same people without their colours, as is the steepness, which comes out the 
 NETWORK_PER_VIEW, NETWORK_SAME, BESIDE_NETWORK = 0.36, 0.25, 0.75
 """What a network's log-odds lose with each doubling of the views, the most that they say for
 somebody, since those whom it confuses look alike in all, and the share of the colours' log-odds
-that is left beside them, as both see the same clothes: fitted as the others (docs/figures.md)."""
+that is left beside them, as both see the same clothes: chosen among others on real people
+(docs/experiments.md)."""
 SUREST_SAME, SUREST_OTHER, SUREST_PART = 4.0, -4.0, 3.0
 """Log-odds that looks alone can give: two people may wear the same, and one may turn round; and the
 most that the least part can say for somebody, as more things look like a small one."""
@@ -116,7 +117,6 @@ class View:
         seen: Silhouette,
         top: float | None,
         above: float = 0.0,
-        described: Described | None = None,
     ) -> View:
         """The look of a silhouette.
 
@@ -126,7 +126,6 @@ class View:
             seen: the silhouette.
             top: metres above the floor of its top, or None.
             above: metres of him that are above the silhouette, where that is known.
-            described: see :class:`View`.
         """
         mask = seen.mask.view(np.uint8)
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=0)
@@ -152,7 +151,6 @@ class View:
             np.maximum(color, 1).astype(np.float32),
             top,
             codes.grey,
-            described,
         )
 
     @cached_property
@@ -265,7 +263,8 @@ class Compared:
     def of_each(self, starts: Sequence[int]) -> Floats:
         """The :meth:`likeness` of the view to each of several people, ``(p, 2)``: to his best view.
 
-        NaN where no slice of his shows in both, so that nothing is known.
+        NaN where no slice of his shows in both, or no view of his has a vector, so that nothing is
+        known.
 
         What one view of somebody does not show is as in whichever other one of his fits best, in
         the same light: who showed above a desk has not the trousers of anybody.
