@@ -63,6 +63,7 @@ def _described(info: ParameterInfo) -> dict[str, Any]:
         'minimum': info.minimum,
         'maximum': info.maximum,
         'choices': list(info.choices),
+        'file': info.file,
     }
 
 

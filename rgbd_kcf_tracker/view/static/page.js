@@ -323,7 +323,7 @@ function parameterRow(info) {
     if (info.minimum !== null) input.min = info.minimum;
     if (info.maximum !== null) input.max = info.maximum;
   }
-  input.disabled = Boolean(stored);
+  input.disabled = Boolean(stored) || info.file;  // a file is named where the page is started
   input.addEventListener('change', () => {
     if (input.type === 'number' && !input.reportValidity()) return;
     const value = input.type === 'checkbox' ? input.checked : input.type === 'number' ? Number(input.value) : input.value;
