@@ -124,10 +124,10 @@ def describe(cls: type) -> tuple[ParameterInfo, ...]:
     return tuple(infos)
 
 
-def files_named(parameters: Parameters) -> list[str]:
-    """Paths of the files that parameters name."""
-    named = [getattr(parameters, i.name) for i in describe(type(parameters)) if i.file]
-    return [path for path in named if path]
+def files_named(parameters: Parameters) -> dict[str, str]:
+    """Paths of the files that parameters name, by their names."""
+    named = {i.name: getattr(parameters, i.name) for i in describe(type(parameters)) if i.file}
+    return {name: path for name, path in named.items() if path}
 
 
 def checked(info: ParameterInfo, value: object) -> Scalar:

@@ -15,7 +15,7 @@ from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.identity.embedding import Embedding
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.pointing import target_at
-from rgbd_kcf_tracker.metric.targets import MetricTargets, network_of
+from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.track import Track, Tracker
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, create_tracker, fitting_parameters
@@ -53,12 +53,10 @@ class TargetSet:
     ) -> None:
         self._variant = variant
         self._parameters = fitting_parameters(variant, parameters)
-        self._cues, self._embedding = cues, embedding
+        self._cues = cues
         self._together: MetricTargets | None = None
         if isinstance(self._parameters, MetricParameters):
-            if embedding is None:
-                self._embedding = network_of(self._parameters)
-            self._together = MetricTargets(self._parameters, cues, embedding=self._embedding)
+            self._together = MetricTargets(self._parameters, cues, embedding=embedding)
         elif cues or embedding is not None:
             raise ParameterError(f'variant {variant} knows no cues and no embedding: use metric')
         self._trackers: dict[int, Tracker] = {}
@@ -67,7 +65,8 @@ class TargetSet:
 
     def anew(self) -> TargetSet:
         """The same with nobody in it; what was read from files is not read again."""
-        return TargetSet(self._variant, self._parameters, self._cues, self._embedding)
+        embedding = None if self._together is None else self._together.embedding
+        return TargetSet(self._variant, self._parameters, self._cues, embedding)
 
     @property
     def everyone(self) -> bool:

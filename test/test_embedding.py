@@ -119,8 +119,8 @@ def test_a_network_that_is_not_there_is_no_parameter(tmp_path: Path, monkeypatch
     (tmp_path / 'means.onnx').write_bytes(average_pool())
     given = with_overrides(MetricParameters(), {'embedding': 'means.onnx'})
     assert given.embedding == str(tmp_path / 'means.onnx'), 'a run may go on in another folder'
-    assert files_named(given) == [given.embedding]
-    assert files_named(MetricParameters()) == []
+    assert files_named(given) == {'embedding': given.embedding}
+    assert files_named(MetricParameters()) == {}
 
 
 def test_a_set_that_begins_anew_does_not_read_its_network_again(network: str):
@@ -192,6 +192,17 @@ def test_before_a_camera_that_moves_everybody_is_described_in_each_frame():
             targets.update(picture([one] if i > 3 else [], 0.1 * i, pose=pose))
         asked[turn] = len(embedding.asked)
     assert asked[0.05] > asked[0.0] > 0
+
+
+def test_who_comes_after_a_frame_without_anybody_is_described(monkeypatch: pytest.MonkeyPatch):
+    """Where somebody was half a second ago, and nobody since, stands whoever comes."""
+    forgotten = []
+    monkeypatch.setattr(Describer, 'forget', lambda self: forgotten.append(True))
+    targets = TargetSet('metric', embedding=Fixed(None))
+    targets.everyone = True
+    for i in range(8):
+        targets.update(picture([Someone(0.0, 3.0)] if i in (4, 5) else [], 0.1 * i))
+    assert len(forgotten) == 6
 
 
 def test_vectors_have_length_one_whatever_the_network_gives():

@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import dataclasses
-import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -276,19 +275,6 @@ def tracker_parameters(args: argparse.Namespace, variant: str) -> Parameters:
             raise ParameterError(f'--param {key}: the tracker is {variant}, not {owner!r}')
         given[name] = value
     return with_overrides(default_parameters(variant), given)
-
-
-def with_whole_paths(items: Sequence[str]) -> list[str]:
-    """``key=value`` words in which files are named from the root on, for who runs elsewhere."""
-    from rgbd_kcf_tracker.parameters import describe
-    from rgbd_kcf_tracker.variants import VARIANTS
-
-    files = {i.name for v in VARIANTS.values() for i in describe(v.parameters) if i.file}
-    return [
-        f'{key}={os.path.abspath(value)}' if value and key.rpartition('.')[2] in files else item
-        for item in items
-        for key, _, value in [item.partition('=')]
-    ]
 
 
 def require_mcap(path: str, option: str = '') -> None:

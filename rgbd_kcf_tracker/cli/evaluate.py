@@ -232,8 +232,9 @@ def _identity(args: argparse.Namespace) -> int:
     refuse(args, 'with --identity', ('kind', *options, *_OF_ONE_TARGET), usual=USUAL)
     read = data_options(args, everyone=args.everyone or args.identity)
     sequences = checked(args, [s for text in args.dataset for s in open_dataset(text, read)])
+    parameters = tracker_parameters(args, 'metric')
     with report_folder(args.report):
-        return _compare(args, sequences, tracker_parameters(args, 'metric'))
+        return _compare(args, sequences, parameters)
 
 
 def _compare(

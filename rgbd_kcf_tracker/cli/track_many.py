@@ -137,15 +137,12 @@ def _run_in(
 ) -> int:
     """Follow through recordings, into folders that are there; returns the exit code."""
     from rgbd_kcf_tracker.batch.loop import run_all
-    from rgbd_kcf_tracker.cli.common import tracker_parameters
-    from rgbd_kcf_tracker.parameters import files_named
-    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
 
     tables = [folders['output'] / name for name in (SOURCES, f'tracks.{args.table or TABLES[0]}')]
     _refuse_to_write(own, [*tables, folders['output'] / RECORD], read)
     needs = list(dict.fromkeys(Path(job.source).parent for job in own))
     with open_workers(args, needs, list(folders.values())) as workers:
-        named = files_named(tracker_parameters(args, args.variant or DEFAULT_VARIANT))
+        named = list(_named(args).values())
         own = _identified(own, None if args.cluster is None else workers, named)
         todo = [job for job in own if not _is_done(folders['output'], job)]
         if not args.overwrite:
@@ -301,13 +298,25 @@ def _job(args: argparse.Namespace, source: str, name: str, folders: dict[str, Pa
 def _check_parameters(args: argparse.Namespace) -> None:
     """Mistakes that every recording would stumble on are told once, before any of them."""
     from rgbd_kcf_tracker.cli import track
-    from rgbd_kcf_tracker.cli.common import parse_box, read_options, with_whole_paths
+    from rgbd_kcf_tracker.cli.common import parse_box, read_options
 
     track.make_follower(args)
-    args.param = with_whole_paths(args.param)
+    # A file is named from the root on, for who runs elsewhere.
+    files = _named(args)
+    others = [s for s in args.param if s.partition('=')[0].rpartition('.')[2] not in files]
+    args.param = others + [f'{name}={path}' for name, path in files.items()]
     for text in args.init:
         parse_box(text)
     read_options(args)
+
+
+def _named(args: argparse.Namespace) -> dict[str, str]:
+    """Files that the tracker's parameters name."""
+    from rgbd_kcf_tracker.cli.common import tracker_parameters
+    from rgbd_kcf_tracker.parameters import files_named
+    from rgbd_kcf_tracker.variants import DEFAULT_VARIANT
+
+    return files_named(tracker_parameters(args, args.variant or DEFAULT_VARIANT))
 
 
 # --- one recording

@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.evaluation.store import slug
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.parameters import describe, with_overrides
+from rgbd_kcf_tracker.parameters import describe, files_named, with_overrides
 from rgbd_kcf_tracker.track import Track, Tracker, TrackState, require_inside
 from rgbd_kcf_tracker.variants import VARIANTS, create_tracker, default_parameters
 
@@ -55,7 +55,7 @@ class Contender:
             parameters = self.parameters()
             values = dataclasses.asdict(parameters)
             # Where a file lies is of a machine: its content is in the key of a run.
-            values |= dict.fromkeys((i.name for i in describe(type(parameters)) if i.file), '')
+            values |= dict.fromkeys(files_named(parameters), '')
         elif self.kind == 'opencv':
             values = cv2.__version__
         return json.dumps([self.kind, self.source, values], sort_keys=True)
@@ -151,13 +151,10 @@ def variant(name: str, overrides: Mapping[str, str] | None = None) -> Contender:
         if name not in VARIANTS:
             known = ', '.join([*VARIANTS, *(OPENCV_PREFIX + n for n in OPENCV_TRACKERS)])
             raise ParameterError(f'unknown variant {name!r}: choose from {known}')
-        pairs = tuple(sorted((overrides or {}).items()))
-        label = ' '.join([name, *(f'{k}={v}' for k, v in pairs)])
-        contender = Contender(label, 'variant', name, pairs)
-        given = contender.parameters()
-        files = {info.name for info in describe(type(given)) if info.file}
-        full = tuple((k, getattr(given, k) if k in files else v) for k, v in pairs)
-        contender = dataclasses.replace(contender, overrides=full)
+        given = dict(sorted((overrides or {}).items()))
+        label = ' '.join([name, *(f'{k}={v}' for k, v in given.items())])
+        files = files_named(with_overrides(default_parameters(name), given))
+        contender = Contender(label, 'variant', name, tuple((given | files).items()))
     contender.make()
     return contender
 

@@ -22,7 +22,6 @@ from scipy.optimize import minimize
 from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, Sequence, open_dataset
-from rgbd_kcf_tracker.evaluation.datasets.base import with_intrinsics
 from rgbd_kcf_tracker.evaluation.evidence_fit import camera
 from rgbd_kcf_tracker.evaluation.identity import (
     Pairs,
@@ -33,6 +32,7 @@ from rgbd_kcf_tracker.evaluation.identity import (
     look,
     metric_views,
 )
+from rgbd_kcf_tracker.evaluation.jobs import RunOptions, as_asked
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.identity.gallery import (
     BESIDE_NETWORK,
@@ -138,9 +138,7 @@ def fit(told: Told) -> tuple[float, float]:
 
 def _seen(sequence: Sequence, parameters: MetricParameters, camera: Intrinsics | None) -> Seen:
     """The people of a recording, described."""
-    samples = sequence.open().samples
-    if camera is not None:
-        samples = with_intrinsics(samples, camera)
+    samples = as_asked(sequence.open().samples, sequence, RunOptions(intrinsics=camera))
     return look(sequence.name, samples, metric_views(parameters))
 
 

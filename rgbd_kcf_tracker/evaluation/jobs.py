@@ -136,7 +136,7 @@ def run_key(sequence: Sequence, contender: Contender, options: RunOptions) -> st
         extra = dict(contender.files).get(sequence.name) or boxes_digest(sequence, contender)
     elif contender.kind == 'variant':
         files = files_named(contender.parameters())
-        extra = files_digest([Path(file) for file in files]) if files else ''
+        extra = files_digest([Path(file) for file in files.values()]) if files else ''
     parts = [
         *_source(sequence), contender.identity, extra, options.code,
         options.rate_hz, options.use_depth, options.short_term,

@@ -71,6 +71,7 @@ class MetricTargets:
         puts_off: whether what can wait until an answer is out waits for :meth:`settle`, or else for
             the next frame: the answers are the same, if a frame's images stay as they were so long.
         account: how the last frame was explained; None where it had no depth.
+        embedding: what describes people; None where nothing does.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class MetricTargets:
     ) -> None:
         self._parameters = parameters
         self._cues = cues
-        self._embedding = network_of(parameters) if embedding is None else embedding
+        self.embedding = _network_of(parameters) if embedding is None else embedding
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
         self._reader, self._crowd = self._new_memory(first)
@@ -212,7 +213,7 @@ class MetricTargets:
     def _new_memory(self, first: int) -> tuple[SceneReader, Crowd]:
         p = self._parameters
         reader = SceneReader(p.view_width, p.jump, p.jump_per_metre, p.floor_margin)
-        self._describer = None if self._embedding is None else Describer(self._embedding)
+        self._describer = None if self.embedding is None else Describer(self.embedding)
         return reader, Crowd(first, self._describer)
 
     def _follower(self, frame: Frame, box: Box) -> Follower:
@@ -429,7 +430,7 @@ class MetricTargets:
         return tracks
 
 
-def network_of(parameters: MetricParameters) -> Embedding | None:
+def _network_of(parameters: MetricParameters) -> Embedding | None:
     """The network that parameters name, if they do.
 
     Raises:
@@ -460,7 +461,7 @@ class MetricTracker:
         embedding: Embedding | None = None,
     ) -> None:
         self._parameters, self._cues = parameters, cues
-        self._embedding = network_of(parameters) if embedding is None else embedding
+        self._embedding = _network_of(parameters) if embedding is None else embedding
         self._targets: MetricTargets | None = None
         self._number = 0
 

@@ -256,9 +256,9 @@ class Crowd:
     def _sights(self, scene: Scene, figures: list[Figure], time: float) -> list[Sight]:
         """The look of each figure, described where there is a network."""
         views = [look_of(scene, figure.seen) for figure in figures]
+        if self._describer is not None and (scene.motion is not None or not figures):
+            self._describer.forget()
         if self._describer is not None and figures:
-            if scene.motion is not None:
-                self._describer.forget()
             boxes = [box_about(scene, figure.seen) for figure in figures]
             places = np.stack([figure.place for figure in figures])
             views = self._describer.everybody(views, boxes, places, time)

@@ -42,7 +42,10 @@ class Describer:
         self._last: list[tuple[float, View]] = []
 
     def forget(self) -> None:
-        """What is where the last frame showed somebody may be anything: the camera has moved."""
+        """Who is where the last frame showed somebody may be anybody.
+
+        The camera has moved, or that frame showed nobody.
+        """
         self._places, self._last = np.zeros((0, 2)), []
 
     def described(self, views: Sequence[View], boxes: Sequence[Box]) -> list[View]:
