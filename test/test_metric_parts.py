@@ -106,6 +106,30 @@ def test_the_share_of_a_surface_that_is_others_is_that_of_its_pixels():
         assert others.share(scene.silhouette(label)) == pytest.approx(share)
 
 
+def test_something_large_goes_on_beyond_a_piece_of_it_and_not_beyond_somebody_or_a_chair():
+    """Of two figures that touch, of what is nearer and of what is too small nothing is told."""
+    depth = wall()
+    depth[30:130, 20:40] = 3.0  # somebody before the wall
+    depth[60:100, 70:100] = 3.0  # a chair with somebody on it
+    depth[:, 180:] = 3.5  # something nearer beside a piece of the wall
+    scene = SceneReader(240, 0.04, 0.03, 0.0).read(
+        Frame(np.zeros((160, 240, 3), np.uint8), depth, 0, CAMERA), 0.0
+    )
+    assert scene is not None
+    boxes = [(20, 30, 20, 100), (70, 60, 15, 40), (130, 20, 25, 100), (155, 20, 25, 100)]
+    boxes.append((210, 20, 2, 2))
+    figures = [
+        Silhouette.of(scene.view, left, top, np.ones((height, width), bool), 0, Rim())
+        for left, top, width, height in boxes
+    ]
+    somebody, seated, piece, beside, speck = Parts(scene, figures).going_on
+    assert somebody == 0.0
+    assert seated == 0.0, 'the chair is no larger than he'
+    assert piece == 1.0
+    assert beside == 1.0
+    assert speck is None
+
+
 def test_view_takes_every_step_and_fills_single_holes():
     depth = np.full((480, 640), 2.0, np.float32)
     depth[4::8, 4::8] = np.nan

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.perceive.room import tolerance
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
@@ -19,6 +21,13 @@ Kinds = npt.NDArray[np.uint16]
 
 NOTHING, ROOM, FIRST = 0, 1, 2
 """Kinds of pixels: of nothing known, of the room, of the first of the figures and so on."""
+BEYOND = 3
+"""Pixels of the view beyond an outline at which it is asked what goes on there: one beyond the two
+that a seam between two surfaces is wide."""
+STEPS = 0.6
+"""Of the tolerance of the room up to which depth goes on beyond an outline: two deviations."""
+LEAST_OUTLINE = 15
+"""Places along an outline that tell of it at the least: fewer are one corner of it."""
 
 
 class Parts:
@@ -29,7 +38,6 @@ class Parts:
         figures: silhouettes that do not overlap.
 
     Attributes:
-        surfaces: of the scene.
         kinds: ``(h, w)``, see :data:`FIRST`.
         length: number of kinds.
     """
@@ -37,9 +45,39 @@ class Parts:
     def __init__(self, scene: Scene, figures: Sequence[Silhouette]) -> None:
         self.kinds: Kinds = scene.still.astype(np.uint16)
         self.length = FIRST + len(figures)
+        self._scene = scene
         for kind, seen in enumerate(figures, FIRST):
             self.kinds[seen.rows, seen.cols][seen.mask] = kind
         self._counts: dict[Silhouette, list[int]] = {}
+
+    @cached_property
+    def going_on(self) -> list[float | None]:
+        """For each figure the share of its outline beyond which something large goes on.
+
+        Somebody ends where what is farther shows beside him; a piece of a wall is one surface with
+        the rest of it, which is larger than anybody. Whatever else is beside him tells nothing, and
+        a share is None where hardly anything does.
+        """
+        scene, elsewhere = self._scene, self.kinds < FIRST
+        asked = elsewhere & scene.standing
+        large = np.where(scene.large, np.arange(len(scene.surfaces)), 0)[scene.surfaces.labels]
+        goes_on, ends = np.zeros((2, self.length), np.intp)
+        images = scene.view.depth, self.kinds, elsewhere, asked, large
+        for turned in (np.asarray, np.fliplr, np.transpose, lambda image: np.fliplr(image.T)):
+            depth, kinds, outside, beyond, surface = (turned(image) for image in images)
+            here, next_, there = np.s_[:, :-BEYOND], np.s_[:, 1 : 1 - BEYOND], np.s_[:, BEYOND:]
+            at = np.nonzero((kinds[here] >= FIRST) & outside[next_] & beyond[there])
+            inside, kind = depth[here][at], kinds[here][at]
+            step, noise = depth[there][at] - inside, STEPS * tolerance(inside)
+            same = surface[here][at]
+            on = (np.abs(step) <= noise) & (same > 0) & (same == surface[there][at])
+            goes_on += np.bincount(kind[on], minlength=self.length)
+            ends += np.bincount(kind[step > noise], minlength=self.length)
+        told = goes_on + ends
+        return [
+            float(on / of) if of >= LEAST_OUTLINE else None
+            for on, of in zip(goes_on[FIRST:], told[FIRST:], strict=True)
+        ]
 
     def counts(self, seen: Silhouette) -> list[int]:
         """How many of a silhouette's pixels are of each kind."""

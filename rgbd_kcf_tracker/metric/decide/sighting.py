@@ -53,6 +53,10 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
         walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
         person.moved_to(place, account.time, walks)
     person.last, person.figure = seen, index >= 0
+    if index >= 0 and scene.stood_for < math.inf:
+        goes_on = account.parts.going_on[index]
+        if goes_on is not None:
+            person.outline.add(goes_on, 1.0, account.time)
     if not sure or (scene.since is None and person.gallery.views):
         return
     person.area = max(person.area, seen.area)

@@ -55,6 +55,10 @@ TRAVELLED = 0.5
 BEYOND, EMPTY = 0.3, 0.5
 """Metres behind the last sight of somebody at which the camera sees past its place, and the share
 of its outline where it does so if it has gone."""
+GOES_ON = 0.3
+"""Share of an outline beyond which something large goes on, from which it is of a piece of that and
+not of somebody: of real and simulated people one sighting in five hundred has it, of pieces of
+walls more than half."""
 ANYWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden): of some
 fifty boxes one is on something else."""
@@ -89,6 +93,8 @@ class Person:
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
+        outline: the shares of its outline beyond which depth goes on, of the sightings of late,
+            before a camera that moves.
         again: log-odds that it is one of those who had gone before it came, by its looks alone, see
             :class:`~rgbd_kcf_tracker.metric.decide.arrivals.Arrival`.
     """
@@ -105,13 +111,20 @@ class Person:
         self.last: Silhouette | None = None
         self.calm: Calm | None = None
         self.area, self.again = 0.0, -math.inf
+        self.outline = Tally()
         self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
 
     @property
     def alive(self) -> bool:
         """Whether this is surely somebody and not a thing that was moved or a door that opened."""
-        return self.chosen or self.upright or self.travelled > TRAVELLED
+        return self.chosen or ((self.upright or self.travelled > TRAVELLED) and not self._is_piece)
+
+    @property
+    def _is_piece(self) -> bool:
+        """Whether it is a piece of a wall, or of something else that goes on beside it."""
+        goes_on = self.outline.mean if self.outline.enough else None
+        return goes_on is not None and goes_on > GOES_ON
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""
