@@ -33,7 +33,7 @@ def test_groups_of_scenarios() -> None:
     alone = expand_names(['all'])
     assert set(PEOPLE) == {
         *('comers', 'comers_twins', 'comers_dusk', 'reunion'),
-        *('group_crossing', 'lookaround', 'following'),
+        *('group_crossing', 'at_home', 'lookaround', 'following'),
     }
     assert set(alone) | set(PEOPLE) == set(SCENARIOS)
     assert not set(alone) & set(PEOPLE)
@@ -295,3 +295,37 @@ def test_nobody_flies_in_when_he_comes_back() -> None:
     scene = simulate('comers', seed=2, rate_hz=10.0)
     speeds = [float(np.linalg.norm(scene.velocity(index))) for index in range(len(scene))]
     assert 0.5 < max(speeds) < 3.0
+
+
+@pytest.mark.parametrize('heading', [0.0, 1.0, -2.5])
+def test_who_lies_is_on_the_back_where_they_fell(heading: float) -> None:
+    person = simulate('at_home', seed=1, size=SMALL).scene.actors[0].person
+    feet, high = np.array([0.4, 0.0, 2.5]), 0.2
+    standing, lying = (
+        person.solids(Stance(feet[0], feet[2], heading, lie=lie, on=high)).origin
+        for lie in (0.0, 1.0)
+    )
+    up, ahead = np.array([0.0, -1.0, 0.0]), np.array([math.sin(heading), 0, -math.cos(heading)])
+    assert (standing @ up).max() > 0.9 * person.height
+    # As long as they were tall, from the feet backwards, and on what they lie on.
+    assert np.allclose((lying - feet) @ -ahead, standing @ up, atol=1e-6)
+    assert ((lying @ up) - high).min() > 0.0
+    assert ((lying @ up) - high).max() < 0.25 * person.height
+
+
+def test_people_at_home_sit_and_lie() -> None:
+    lies = sits = 0
+    for seed in range(3):
+        sequence = simulate('at_home', seed=seed, rate_hz=2, size=SMALL)
+        for index in range(len(sequence)):
+            t = index / 2
+            for actor, truth in zip(cast(sequence), sequence.truths(index).values(), strict=True):
+                if not actor.here(t) or truth.body is None:
+                    continue
+                stance = actor._motion(t).stance(t)
+                lies += stance.lie > 0.99
+                sits += stance.sit > 0.99
+                if stance.lie > 0.99:
+                    assert -actor.centre(t)[1] < 0.5
+    assert lies > 20
+    assert sits > 10

@@ -392,7 +392,10 @@ class BySurface:
             stride=float((away / (variance + at_will)).sum()),
             fraction=placed.fraction,
             height=_misfit(
-                seen.height, body.height, seen.cut.top or seen.cut.bottom, body.height_known
+                seen.height,
+                body.height,
+                seen.cut.top or seen.cut.bottom or seen.lies,
+                body.height_known,
             ),
             gone=gone,
             missing=missing,

@@ -333,6 +333,7 @@ class MetricTargets:
         }
         self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()
+        self._reader.lately = self.account.lately()
         for person, calm, silhouette in self.account.calm:
             self._reader.is_furniture(silhouette)
             self._crowd.is_furniture(person, calm)

@@ -92,10 +92,12 @@ class VisitorActor:
         low = 1 - 0.3 * motion.value('sit', t)
         stance = motion.stance(t)
         back = 0.2 * stance.sit * self.person.height
-        return np.array([
+        middle = np.array([
             stance.x - back * math.sin(stance.heading), -0.55 * low * self.person.height,
             stance.z + back * math.cos(stance.heading),
         ])  # fmt: skip
+        rotation, offset = stance.fallen(self.person.height)
+        return middle if stance.lie == 0 else rotation @ (middle - offset)
 
     def shadow(self, t: float) -> float:
         """See `Actor`."""

@@ -20,7 +20,9 @@ from rgbd_kcf_tracker.simulation.room import (
     box_faces,
     chair,
     face,
+    mattress,
     random_room,
+    sofa,
     table,
 )
 from rgbd_kcf_tracker.simulation.stage import Stage
@@ -48,11 +50,19 @@ class Exit:
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A chair: where the feet of somebody who sits there are, and where they look."""
+    """A chair, sofa or mattress.
+
+    Attributes:
+        feet: where those of somebody who sits or lies there are.
+        front: from where they come.
+        facing: radians, where they look.
+        height: metres above the floor of what they lie on.
+    """
 
     feet: Point
     front: Point
     facing: float
+    height: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +81,13 @@ class Hall:
         things: fewest and one more than most pieces that stand in the middle.
         depth: metres to the wall at the back, least and most.
         half_width: metres to the walls at the sides, least and most.
+        rests: whether there are sofas and a mattress.
     """
 
     def __init__(
         self, stage: Stage, things: tuple[int, int] = (2, 5),
         depth: tuple[float, float] = (4.7, 6.2), half_width: tuple[float, float] = (4.3, 5.4),
+        rests: bool = False,
     ) -> None:  # fmt: skip
         self.stage = stage
         rng = stage.rng
@@ -85,11 +97,14 @@ class Hall:
         self.plan = FloorPlan()
         self.seats: list[Seat] = []
         self.niches: list[Niche] = []
+        self.rests: list[Seat] = []
         farthest = stage.half_width - 0.9
         door = stage.x(stage.uniform(-0.6, 0.6), stage.depth)
         self.door = min(max(door, -farthest), farthest)
         self._door_width = stage.uniform(0.95, 1.2)
         self._open_door()
+        if rests:
+            self._to_rest()
         for _ in range(int(rng.integers(3, 8))):
             self._along_walls()
         for _ in range(int(rng.integers(*things))):
@@ -219,6 +234,21 @@ class Hall:
             if self.plan.free(*niche.front):
                 self.niches.append(niche)
 
+    def _to_rest(self) -> None:
+        """Two sofas and a mattress, as far as there is a place for them."""
+        stage = self.stage
+        for make in (sofa, mattress, sofa):
+            for _ in range(60):
+                z = stage.uniform(2.3, min(stage.depth - 1.0, 4.3))
+                x = stage.x(stage.uniform(-0.7, 0.7), z)
+                turn = stage.uniform(-0.9, 0.9) + (math.pi / 2 if make is mattress else 0.0)
+                faces, reach, height = make(stage.rng, np.array([x, 0.0, z]), turn)
+                ahead = (math.sin(turn), -math.cos(turn))
+                feet, front = ((x + d * ahead[0], z + d * ahead[1]) for d in (reach, reach + 0.6))
+                if self.plan.free(*front) and self._place(Room(faces)) is not None:
+                    self.rests.append(Seat(feet, front, turn, height))
+                    break
+
     def _place(self, piece: Room) -> Footprint | None:
         """Take a piece into the room where it is in nobody's way."""
         points = [
@@ -234,7 +264,8 @@ class Hall:
         door = Footprint(self.door - 0.9, self.stage.depth - 1.4, self.door + 0.9, 99.0)
         near = Footprint(-9.0, -9.0, 9.0, 1.5)
         kept = [door, near, *(f.grown(0.7) for f in self.plan.footprints[2:])]
-        fronts = [*(niche.front for niche in self.niches), *(seat.front for seat in self.seats)]
+        fronts = [niche.front for niche in self.niches]
+        fronts += [seat.front for seat in (*self.seats, *self.rests)]
         kept += [footprint([front]).grown(0.3) for front in fronts]
         if any(mine.meets(k) for k in kept):
             return None

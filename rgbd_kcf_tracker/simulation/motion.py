@@ -48,8 +48,8 @@ class Motion:
         heading: ``(seconds, radians)``; without it the figure looks where it goes.
         stride: metres per two steps.
         corner_s: smoothing of corners and of starting and stopping.
-        channels: further keys by `Stance` field (``crouch``, ``spread``, ``reach``, ``sit``), or
-            ``lift``.
+        channels: further keys by `Stance` field (``crouch``, ``spread``, ``reach``, ``sit``,
+            ``lie``, ``on``), or ``lift``.
         phase: of the gait at the start.
     """
 
@@ -83,7 +83,7 @@ class Motion:
             'phase': phase + 2 * np.pi * np.cumsum(speed) * _STEP / stride,
         }  # fmt: skip
         for name, keys in (channels or {}).items():
-            self._table[name] = _keyed(t, keys, 0.12)
+            self._table[name] = _keyed(t, keys, 0.3 if name == 'lie' else 0.12)
 
     def value(self, name: str, t: float, default: float = 0.0) -> float:
         """One tabulated quantity at ``t`` seconds."""
@@ -99,7 +99,7 @@ class Motion:
         v = self.value
         return Stance(
             v('x', t), v('z', t), v('heading', t), v('phase', t), v('effort', t), v('crouch', t),
-            v('spread', t), v('reach', t), v('sit', t),
+            v('spread', t), v('reach', t), v('sit', t), v('lie', t), v('on', t),
         )  # fmt: skip
 
 

@@ -30,6 +30,9 @@ from rgbd_kcf_tracker.simulation.wardrobe import (
     Wardrobe,
 )
 
+BACK = 0.08
+"""From the middle of a body to its back, in its heights."""
+
 
 @dataclass(frozen=True, slots=True)
 class Stance:
@@ -45,6 +48,8 @@ class Stance:
         spread: 0 arms down to 1 arms out to the sides.
         reach: 0 to 1, right hand held up in front.
         sit: 0 upright to 1 sitting: the feet stay at ``x, z``, the pelvis is behind them.
+        lie: 0 upright to 1 lying on the back, the feet at ``x, z``.
+        on: metres above the floor of what they lie on.
     """
 
     x: float
@@ -56,6 +61,28 @@ class Stance:
     spread: float = 0.0
     reach: float = 0.0
     sit: float = 0.0
+    lie: float = 0.0
+    on: float = 0.0
+
+    def fallen(self, height: float) -> tuple[Vector, Vector]:
+        """Rotation and offset by which somebody who stands, ``height`` tall, comes to lie.
+
+        A point ``p`` goes to ``rotation @ (p - offset)``.
+        """
+        angle = 0.5 * math.pi * self.lie
+        feet = np.array([self.x, 0.0, self.z])
+        side, up, forward = self.axes
+        back = math.cos(angle) * up - math.sin(angle) * forward
+        belly = math.cos(angle) * forward + math.sin(angle) * up
+        rotation = np.outer(side, side) + np.outer(back, up) + np.outer(belly, forward)
+        rests = feet + up * (BACK * height * math.sin(angle) + self.on * self.lie)
+        return rotation, feet - rotation.T @ rests
+
+    @property
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """Unit vectors to the left, up and ahead of somebody upright."""
+        sin, cos = math.sin(self.heading), math.cos(self.heading)
+        return np.array([cos, 0, sin]), np.array([0, -1.0, 0]), np.array([sin, 0, -cos])
 
 
 @dataclass(frozen=True)
@@ -84,7 +111,8 @@ class Person:
 
     def solids(self, stance: Stance, parts: str = 'all') -> Solids:
         """The figure in the world frame; ``parts`` is ``'all'``, ``'head'`` or ``'body'``."""
-        return _Figure(self, stance).build(parts)
+        solids = _Figure(self, stance).build(parts)
+        return solids.moved(*stance.fallen(self.height)) if stance.lie > 0 else solids
 
     def hand(self, stance: Stance) -> Vector:
         """Where the right hand is, world frame."""
@@ -116,10 +144,7 @@ class _Figure:
 
     def __init__(self, person: Person, stance: Stance) -> None:
         self.person, self.stance = person, stance
-        sin, cos = math.sin(stance.heading), math.cos(stance.heading)
-        self.forward = np.array([sin, 0.0, -cos])
-        self.side = np.array([cos, 0.0, sin])  # the person's left
-        self.up = np.array([0.0, -1.0, 0.0])
+        self.side, self.up, self.forward = stance.axes
         h = person.height
         self.unit = h
         self.width = h * person.build

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import cv2
@@ -253,6 +254,35 @@ def chair(rng: np.random.Generator, spot: Vector, turn: float) -> list[Face]:
     back = rng.uniform(0.4, 0.6)
     faces += box_faces(spot + shift - np.array([0, h, 0]), (w, back, 0.04), turn, cloth)
     return faces + _legs(spot, w, d, h - 0.06, turn, [materials.wood(rng, 64, 64)])
+
+
+def sofa(rng: np.random.Generator, spot: Vector, turn: float) -> tuple[list[Face], float, float]:
+    """A sofa; its faces, metres ahead of its middle of the feet of who sits there, and 0.
+
+    Whoever sits there sinks in by some centimetres.
+    """
+    color = textures.random_color(rng, (0.1, 0.6), (0.15, 0.8))
+    skin = [textures.cloth(rng, 160, 160, 'plain', (color, color, color))]
+    wide, deep, high = rng.uniform(1.4, 2.0), 0.5, rng.uniform(0.4, 0.46)
+    back, arms = rng.uniform(0.8, 0.95), rng.uniform(0.55, 0.65)
+    across = np.array([math.cos(turn), 0, math.sin(turn)]) * (wide / 2 + 0.08)
+    behind = np.array([-math.sin(turn), 0, math.cos(turn)]) * (deep / 2 + 0.09)
+    faces = box_faces(spot, (wide, high, deep), turn, skin)
+    faces += box_faces(spot + behind, (wide, back, 0.18), turn, skin)
+    for side in (-1, 1):
+        faces += box_faces(spot + side * across, (0.16, arms, deep + 0.1), turn, skin)
+    return faces, deep / 2 - 0.04, 0.0
+
+
+def mattress(
+    rng: np.random.Generator, spot: Vector, turn: float
+) -> tuple[list[Face], float, float]:
+    """A mattress on the floor; its faces, where feet are as of a :func:`sofa`, and its height."""
+    colors = tuple(textures.random_color(rng, (0.0, 0.5), (0.4, 0.95)) for _ in range(3))
+    kind = str(rng.choice(['plain', 'stripes', 'checks']))
+    skin = [textures.cloth(rng, 256, 256, kind, (colors[0], colors[1], colors[2]))]
+    wide, high, long = rng.uniform(0.9, 1.2), rng.uniform(0.15, 0.3), rng.uniform(1.9, 2.1)
+    return box_faces(spot, (wide, high, long), turn, skin), long / 2 - 0.1, high
 
 
 def _legs(

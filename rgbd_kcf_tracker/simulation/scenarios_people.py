@@ -23,6 +23,7 @@ from rgbd_kcf_tracker.simulation.walking import Action, Away, Go, Stay, Visit, W
 from rgbd_kcf_tracker.simulation.world import Actor, Gain, World
 
 LONG_S = 45.0
+AT_HOME_S = 40.0
 ABSENCE_S = (6.0, 25.0)
 PAN_SPEED = math.radians(23)
 several = partial(scenario, several=True)
@@ -358,6 +359,47 @@ def group_crossing(stage: Stage) -> World:
             diary.look_about(2.0)
     seconds = min(max(diary.now for diary in diaries), 32.0)
     return _scene(hall, diaries, seconds)
+
+
+@several('people at home sit on a sofa, lie on a mattress, fall, leave, and come back')
+def at_home(stage: Stage) -> World:
+    """Who sits back or lies is hardly before what is under them, and no taller than a dog."""
+    stage.place_camera(0.8, 2.1)
+    hall = Hall(stage, (0, 2), rests=True)
+    diaries = [_Diary(hall, person) for person in _people(stage, 3, 4)]
+    for k, diary in enumerate(diaries):
+        if k == 0:
+            _begin(diary, [], seat=False)
+        else:
+            diary.enter_late(hall.other_exit(None), stage.uniform(1.0, 6.0) * k)
+        while diary.now < AT_HOME_S:
+            _rest(diary)
+            if stage.rng.uniform() < 0.4:
+                diary.do_something()
+            if stage.rng.uniform() < 0.3:
+                out = hall.other_exit(None)
+                diary.leave(out)
+                diary.come_back(hall.other_exit(out.name), stage.uniform(4.0, 10.0))
+    return _scene(hall, diaries, AT_HOME_S)
+
+
+def _rest(diary: _Diary) -> None:
+    """Sit down on a sofa or lie down on a mattress that nobody has had yet; or fall."""
+    stage, hall = diary.stage, diary.hall
+    if hall.rests and stage.rng.uniform() < 0.8:
+        seat = hall.rests.pop(int(stage.rng.integers(len(hall.rests))))
+        stance = {'lie': 1.0, 'on': seat.height} if seat.height else {'sit': 1.0}
+        diary.go(seat.front)
+        diary.go(seat.feet, straight=True)
+        diary.stay(0.9, seat.facing)
+        diary.stay(stage.uniform(4.0, 9.0), seat.facing, **stance)
+        diary.stay(1.2, seat.facing)
+        diary.go(seat.front, straight=True)
+        return
+    diary.go(hall.spot((1.9, 3.8), 0.6))
+    diary.stay(stage.uniform(0.3, 1.0), stage.uniform(-math.pi, math.pi))
+    diary.stay(stage.uniform(3.0, 8.0), lie=1.0)
+    diary.stay(1.5)
 
 
 @several('a camera turns to and fro at 23 degrees a second among people who stand, sit and walk')

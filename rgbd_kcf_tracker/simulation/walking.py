@@ -36,12 +36,14 @@ class Go:
 
 @dataclass(frozen=True, slots=True)
 class Stay:
-    """Stand, or sit, for a while.
+    """Stand, sit or lie for a while.
 
     Attributes:
         seconds: how long.
         facing: radians, None to look on as before.
         sit: 1 to sit down.
+        lie: 1 to lie down.
+        on: metres above the floor of what they lie on.
         reach: 0 to 1, right hand held up.
     """
 
@@ -49,6 +51,8 @@ class Stay:
     facing: float | None = None
     sit: float = 0.0
     reach: float = 0.0
+    lie: float = 0.0
+    on: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +141,10 @@ def rehearse(walkers: Sequence[Walker], plan: FloorPlan, seconds: float) -> list
             if state.here:
                 action = state.action
                 stay = action if isinstance(action, Stay) else Stay(0)
-                dx, dz, turn = _sway(t, state.walker.sway, 0.3 if stay.sit else 1.0)
-                state.record.append(
-                    (t, state.x + dx, state.z + dz, state.heading + turn, stay.sit, stay.reach)
-                )
+                rests = stay.sit or stay.lie
+                dx, dz, turn = _sway(t, state.walker.sway, 0.3 if rests else 1.0)
+                place = t, state.x + dx, state.z + dz, state.heading + turn
+                state.record.append((*place, stay.sit, stay.reach, stay.lie, stay.on))
     return [
         [
             *(_visit(record, state.walker.stride) for record in state.visits if len(record) > 3),
@@ -284,10 +288,10 @@ def _part(states: Sequence[_State]) -> None:
 
 
 def _visit(record: list[tuple[float, ...]], stride: float, stays: bool = False) -> Visit:
-    t, x, z, heading, sit, reach = (list(c) for c in zip(*record, strict=True))
+    t, x, z, heading, *stances = (list(c) for c in zip(*record, strict=True))
     channels = {
         name: list(zip(t, values, strict=True))
-        for name, values in (('sit', sit), ('reach', reach))
+        for name, values in zip(('sit', 'reach', 'lie', 'on'), stances, strict=True)
         if any(values)
     }
     motion = Motion(list(zip(t, x, z, strict=True)), heading=list(zip(t, heading, strict=True)),

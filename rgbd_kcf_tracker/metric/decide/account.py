@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
+from rgbd_kcf_tracker.metric.perceive.fading import Lately
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -354,6 +355,14 @@ class Account:
         # Who was chosen is waited for, however many others come.
         return person if odds >= (RETURN if person.chosen else self.against) else None
 
+    def lately(self) -> list[Lately]:
+        """Those who are surely people and may still be where they were seen last."""
+        return [
+            Lately(person.last, person.area, person.misses > 0)
+            for person in self.people
+            if person.last is not None and person.alive and person.hidden
+        ]
+
     def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
         mask = np.zeros(self.scene.view.shape, np.bool_)
@@ -367,10 +376,11 @@ class Account:
 def look_of(scene: Scene, seen: Silhouette) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
-    That is where the image ends below it, or depth does beside the upper end of what shows.
+    That is where the image ends below it, or depth does beside the upper end of what shows. Of who
+    lies it is not known how tall he is.
     """
     highest, above = seen.highest(scene.elevation), 0.0
-    top = None if seen.cut.top else highest
+    top = None if seen.cut.top or seen.lies else highest
     ends = seen.ends(scene.view, scene.rim)
     upper = seen.mask[:UPPER]
     beside = (ends.left and upper[:, 0].any()) or (ends.right and upper[:, -1].any())

@@ -125,7 +125,8 @@ class Body:
         z = seen.depth
         fraction = self._fraction(seen)
         lower = y - expected[1] > 0.08 * self.height
-        if expected_sigma is not None and lower and fraction < 0.8 and expected_sigma[1] < 0.3:
+        partly = lower and fraction < 0.8 and not seen.lies
+        if expected_sigma is not None and partly and expected_sigma[1] < 0.3:
             # The head may be hidden without a nearer surface beside it: see whether the colours
             # fit the parts lower down.
             here = band_similarity(self._histograms(seen, codes, view, y), self._colors)

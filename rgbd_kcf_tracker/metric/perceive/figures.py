@@ -10,16 +10,17 @@ between heads (sub-clustering by heads is Munaro and Menegatti's, Autonomous Rob
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
-from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import UPPER, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, surfaces_in
 from rgbd_kcf_tracker.metric.perceive.upright import GROWN
 
@@ -52,6 +53,11 @@ WIDEST, TALLEST = 0.9, 2.2
 UPRIGHT = 1.0
 """Metres of height of each of two pieces beside each other, together at least :data:`BROAD`, from
 which they are two people: no limb is that tall."""
+STAYS, LEAST_STAYS = 0.5, 0.2
+"""Share of the smaller of two outlines that lies in the other where both are of one who has moved
+by less than himself, and of the later one at the least: he may have stretched out."""
+LOW = 0.9
+"""Metres above the floor below which heads side by side are none, but knees, or an arm."""
 AT_REST = 1.0
 """Seconds for which a camera must have stood for what comes before the room to have come: one that
 turns to and fro stands for a moment each time."""
@@ -92,6 +98,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
     part = slice(y, y + height), slice(x, x + width)
     pieces = surfaces_in(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
+    refused: list[Silhouette] = []
     above = np.full(len(pieces), np.inf)
     if scene.elevation is not None:
         above = pieces.means(scene.elevation[part])
@@ -102,12 +109,19 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        left, top = part[1].start + left, part[0].start + top
-        parts = parted(scene.view, scene.forward, scene.axes[0], left, top, member[crop], expected)
+        left, top, whole = part[1].start + left, part[0].start + top, member[crop]
+        parts = [whole]
+        if not _has_lain_down(scene, left, top, whole):
+            parts = parted(scene.view, scene.forward, scene.axes[0], left, top, whole, expected)
         for each in parts:
             seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
-            if seen is not None and makes_figure(scene, seen):
+            if seen is None:
+                continue
+            if makes_figure(scene, seen):
                 found.append(Figure(seen, place_of(scene, seen), len(parts) > 1))
+            elif seen.area > LEAST_AREA:
+                refused.append(seen)
+    found += [Figure(seen, place_of(scene, seen), False) for seen in _low(scene, found, refused)]
     return found
 
 
@@ -171,6 +185,38 @@ def _joined(
         for group, extent in zip(groups, extents, strict=True)
         if extent[5] > LEAST_AREA
     ]
+
+
+def _has_lain_down(scene: Scene, left: int, top: int, mask: Mask) -> bool:
+    """Whether a mask is of one who was here, and so low that it is not of two beside each other."""
+    rows, cols = mask.shape
+    if not scene.lately or scene.elevation is None or rows >= cols:
+        return False
+    high = np.count_nonzero(mask & (scene.elevation[top : top + rows, left : left + cols] > LOW))
+    if high >= (1 - UPPER) * np.count_nonzero(mask):
+        return False
+    here = Silhouette.trimmed(scene.view, left, top, mask, scene.rim)
+    return here is not None and any(here.meets(each) for each in scene.lately)
+
+
+def _low(scene: Scene, found: list[Figure], refused: list[Silhouette]) -> Iterator[Silhouette]:
+    """Those of the silhouettes that are no figures which are where somebody was who is in none.
+
+    He is one however low he has got.
+    """
+    lost = [
+        each for each in scene.lately if not any(_goes_on(each, figure.seen) for figure in found)
+    ]
+    for seen in refused:
+        if any(_goes_on(each, seen) for each in lost):
+            yield seen
+
+
+def _goes_on(before: Silhouette, seen: Silhouette) -> bool:
+    """Whether most of a silhouette is where another was, or most of that where it is."""
+    common = np.count_nonzero(before.common(seen))
+    was, whole = np.count_nonzero(before.mask), np.count_nonzero(seen.mask)
+    return bool(common > max(STAYS * min(was, whole), LEAST_STAYS * whole))
 
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:

@@ -61,6 +61,10 @@ class Light:
         if learns or np.abs(mean / self._mean - 1).max() > UNCHANGED:
             self._mean = mean
             self._measure(image, still)
+        return self.as_before(image)
+
+    def as_before(self, image: Image) -> Image:
+        """An image likewise, where the light is as it was measured last."""
         if np.abs(self.gain - 1).max() < UNCHANGED:
             return image
         table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)

@@ -27,6 +27,9 @@ NOISE_PER_SQUARE_METRE = 0.012
 """Metres by which readings of the same place differ: three deviations of a structured-light
 camera's noise, which grows with the square of depth (Khoshelham and Elberink 2012), and the shift
 of outlines between depth and colour."""
+CLOSER = 0.35
+"""Share of that which is enough where something else says that it is not the room: one deviation,
+beside the shift of outlines."""
 BLIND_FRAMES = 3
 """Frames without a reading after which a pixel is known to have none: a reading there is new."""
 GONE_FRAMES = 2 * BLIND_FRAMES
@@ -225,6 +228,12 @@ class Room:
         nearer: Mask = (depth > 0) & (self.depth > 0) & (self.depth - depth > tolerance(depth))
         return nearer
 
+    def hardly(self, depth: DepthArray) -> Mask:
+        """Pixels, ``(h, w)`` bool, nearer than the room by less than tells them from it."""
+        nearer, allowed = self.depth - depth, tolerance(depth)
+        near: Mask = (nearer > np.float32(CLOSER) * allowed) & (nearer <= allowed)
+        return near & (depth > 0) & (self.depth > 0)
+
     def agrees(self, depth: DepthArray) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
         if depth.shape != self.depth.shape:
@@ -329,6 +338,7 @@ class Room:
         surfaces: Surfaces,
         learns: bool = True,
         undecided: Mask | None = None,
+        closer: Mask | None = None,
     ) -> None:
         """Compare the next view with the room and learn from it.
 
@@ -341,6 +351,8 @@ class Room:
             learns: whether the room is learned from it, or only compared.
             undecided: ``(h, w)`` bool, pixels that are not taken for room where it is not known;
                 None for none.
+            closer: ``(h, w)`` bool, pixels that show something before it however little nearer they
+                are; None for none.
         """
         self._time += dt
         valid = depth > 0
@@ -349,7 +361,9 @@ class Room:
         nearer = self.depth - depth
         both = valid & known
         before = both & (nearer > allowed)
-        same = both & (np.abs(nearer) <= allowed)
+        if closer is not None:
+            before |= both & closer & (nearer > np.float32(CLOSER) * allowed)
+        same = both & (np.abs(nearer) <= allowed) & ~before
         farther = both & ~(before | same) if learns else None
         new = valid & ~known
         open_ = np.flatnonzero(new & (self._blind >= BLIND_FRAMES))

@@ -6,21 +6,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
+from rgbd_kcf_tracker.metric.perceive.fading import STEP, Lately, about, fading
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
+from rgbd_kcf_tracker.metric.perceive.paint import Paint
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
@@ -68,6 +70,7 @@ class Scene:
         since: seconds since the last one from which looks and sizes were learned; None where
             nothing is to be learned from this one but where everybody is, see
             :data:`LEARNING_STEP`.
+        lately: where those were a moment ago who may still be there.
     """
 
     view: DepthView
@@ -87,6 +90,7 @@ class Scene:
     way: Pose | Lost | None
     stood_for: float
     since: float | None
+    lately: Sequence[Silhouette]
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
     @cached_property
@@ -128,6 +132,7 @@ class SceneReader:
         room: what stands still.
         somebody: ``(h, w)`` bool, pixels of the last view that belong to somebody, who may stand
             still without becoming part of the room; to be set by who decides. None for nobody.
+        lately: who may still be where he was in the last view; to be set likewise.
         last_view: the depth of the last frame that had any.
         stood_for: seconds for which the camera has stood still, 0 while it moves.
         seems: how the camera seems to have moved to the last frame, by the picture: the pose of the
@@ -150,12 +155,14 @@ class SceneReader:
         self._rim: Rim | None = None
         self._begun = False
         self._light = Light()
+        self._paint = Paint()
         self._ego = EgoMotion()
         self._pose: Pose | None = None
         self._learned = self._taught = LEARNING_STEP
         self.seems: Pose | None = None
         self.room = Room()
-        self.somebody: npt.NDArray[np.bool_] | None = None
+        self.somebody: Mask | None = None
+        self.lately: Sequence[Lately] = ()
         self.last_view: DepthView | None = None
         self.stood_for = math.inf
         self._unread = 0.0
@@ -195,9 +202,13 @@ class SceneReader:
         def upright(whole: bool) -> UprightPeople:
             return upright_people(view, surfaces, elevation, forward, axes[0], rim, whole=whole)
 
-        self._see_room(view, surfaces, rim, upright, motion, seconds, learns)
+        lately = self.lately if motion is None and seconds <= STEP else ()
+        closer = self._closer(image, view, lately)
+        self._see_room(view, surfaces, rim, upright, motion, seconds, learns, closer)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
+        if learns:
+            self._paint.learn(image, self.room.still, seconds)
         return Scene(
             view=view,
             floor=floor,
@@ -216,7 +227,16 @@ class SceneReader:
             way=way,
             stood_for=self.stood_for,
             since=since,
+            lately=[each.seen for each in lately],
         )
+
+    def _closer(self, image: Image, view: DepthView, lately: Sequence[Lately]) -> Mask | None:
+        """See :meth:`Room.update`: what shows about those who fade, unlike the room."""
+        unlike = self._paint.differs(self._light.as_before(image)) if lately else None
+        if unlike is None:
+            return None
+        faded = fading(lately, unlike & self.room.hardly(view.depth))
+        return None if faded is None else unlike & about(faded)
 
     def _level_after(
         self, floor: Floor | None, view: DepthView, motion: Pose | Lost | None
@@ -266,14 +286,27 @@ class SceneReader:
         motion: Pose | Lost | None,
         seconds: float,
         learns: bool,
+        closer: Mask | None,
     ) -> None:
-        """Show the room a view; ``upright`` tells who in it is a person by his shape alone."""
+        """Show the room a view.
+
+        Args:
+            view: the depth.
+            surfaces: of it.
+            rim: where depth ends.
+            upright: tells who in it is a person by his shape alone.
+            motion: of the camera.
+            seconds: since the last.
+            learns: whether the room is learned from it.
+            closer: see :meth:`Room.update`.
+        """
         begins = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if begins or not self._begun:
             # A camera that warms up sends images without readings: people come with the first.
             self._begun = bool(view.depth.any())
             self.room.restart(view.depth, upright(False).mask)
             self._light.restart()
+            self._paint.restart()
             return
         somebody, undecided = self.somebody, None
         if isinstance(motion, Pose):
@@ -288,8 +321,9 @@ class SceneReader:
             # be what somebody touches.
             undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
             self._light.restart()
+            self._paint.restart()
             somebody = None
-        self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided)
+        self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided, closer)
 
     def settle(self) -> None:
         """Do what an answer need not wait for."""

@@ -1,0 +1,78 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Who gets hard to tell from the room as he sits, leans or lies down in full view.
+
+Depth alone says there that he has gone. But who was there a moment ago has not: about him the
+colours that are not the room's tell him from it, however little nearer he is, and he is himself
+however low he gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from rgbd_kcf_tracker.arrays import Mask
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+
+STEP = 0.5
+"""Seconds from one frame to the next after which nobody is where he was."""
+FADES = 0.75
+"""Share of somebody below which he fades, of the most that was seen of him, as a body turned
+sideways has about as much, and of what was seen last."""
+ABOUT = 5
+"""Pixels of the view, a side of the square about one of his, in which he is in the next frame: who
+sits down does so at half a metre a second."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lately:
+    """Somebody who may still be where he was seen last.
+
+    Attributes:
+        seen: the silhouette.
+        most: square metres, the most that was seen of him.
+        missed: whether he was not found since.
+    """
+
+    seen: Silhouette
+    most: float
+    missed: bool
+
+    def fades(self, hardly: Mask) -> bool:
+        """Whether less of him shows than before.
+
+        Args:
+            hardly: ``(h, w)`` bool, pixels that show something unlike the room, and hardly nearer.
+        """
+        if self.missed or self.seen.area < FADES * self.most:
+            return True
+        mask = self.seen.mask
+        hard = np.count_nonzero(hardly[self.seen.rows, self.seen.cols] & mask)
+        return bool(hard > (1 - FADES) * np.count_nonzero(mask))
+
+
+def fading(lately: Sequence[Lately], hardly: Mask) -> Mask | None:
+    """Where those were seen last who fade, ``(h, w)`` bool; None for nobody.
+
+    Args:
+        lately: all who may still be where they were.
+        hardly: see :meth:`Lately.fades`.
+    """
+    who = [each.seen for each in lately if each.fades(hardly)]
+    if not who:
+        return None
+    mask = np.zeros(hardly.shape, np.bool_)
+    for seen in who:
+        mask[seen.rows, seen.cols] |= seen.mask
+    return mask
+
+
+def about(mask: Mask) -> Mask:
+    """A mask and what is so near to it that it may be there in the next frame, ``(h, w)`` bool."""
+    grown: Mask = cv2.dilate(mask.view(np.uint8), np.ones((ABOUT, ABOUT), np.uint8)).view(np.bool_)
+    return grown

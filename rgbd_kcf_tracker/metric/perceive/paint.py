@@ -1,0 +1,66 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The colours of the room: what looks unlike them stands before it, however little nearer it is.
+
+Who leans back into a sofa or lies down is nearer than these by less than depth is uncertain by, but
+in other colours.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from rgbd_kcf_tracker.arrays import Image, Mask
+
+DIFFERS = 30
+"""Levels of 255 by which a channel differs from the room's for a pixel to show something else: six
+deviations of a camera's noise, of about 5 levels."""
+SETTLE = 3.0
+"""Seconds after which two thirds of a colour is the new one where the room is seen: as it takes
+what stands still to become part of the room (:data:`~.room.SETTLE`)."""
+
+
+class Paint:
+    """What the room of one stream looks like, pixel by pixel, while its camera stands."""
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all: the camera has moved."""
+        self._colors = np.zeros((0, 0, 3), np.float32)
+        self._known = np.zeros((0, 0), np.bool_)
+
+    def differs(self, image: Image) -> Mask | None:
+        """Where an image looks unlike the room, ``(h, w)`` bool; None where nothing is known.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR, in the light of those before.
+        """
+        if self._known.shape != image.shape[:2]:
+            return None
+        blue, green, red = cv2.split(cv2.absdiff(image, cv2.convertScaleAbs(self._colors)))
+        unlike: Mask = cv2.max(cv2.max(blue, green), red) > DIFFERS
+        unlike &= self._known
+        return unlike
+
+    def learn(self, image: Image, still: Mask, dt: float) -> None:
+        """Take the colours of what an image shows of the room.
+
+        Args:
+            image: ``(h, w, 3)`` uint8 BGR, in the light of those before.
+            still: ``(h, w)`` bool, the pixels that show it.
+            dt: seconds since the last.
+        """
+        if self._known.shape != still.shape:
+            self._colors, self._known = image.astype(np.float32), still.copy()
+            return
+        new = still & ~self._known
+        np.copyto(self._colors, image, where=new[:, :, None])
+        self._known |= new
+        share = 1.0 - math.exp(-dt / SETTLE)
+        cv2.accumulateWeighted(image, self._colors, share, still.view(np.uint8))
