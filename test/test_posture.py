@@ -207,23 +207,20 @@ def test_who_shows_less_than_before_fades(area: float, missed: bool, hard: float
         assert about(where).sum() == 104 * 44
 
 
-def test_who_is_known_standing_is_told_nothing_of_lying_down():
+def test_who_is_half_as_high_as_he_stands_is_not_compared_with_that():
     color, depth = images([Someone(0.0, 2.8, RED, BLACK)])
     standing = silhouette(depth, *_cropped(depth == np.float32(2.8)))
     frame, box = on_the_floor(40)
-    lying = silhouette(
-        frame.depth, int(box.x), int(box.y), np.ones((int(box.height), int(box.width)), np.bool_)
-    )
-    assert (standing.lies, lying.lies) == (False, True)
-    upright = View.of(DepthView(depth, 1, CAMERA), ColorCodes(color), standing, 1.6)
-    down = View.of(DepthView(frame.depth, 1, CAMERA), ColorCodes(frame.color), lying, None)
-    gallery = Gallery.of(upright, 0.0)
-    assert gallery.log_odds(upright) > 2
+    mask = np.ones((int(box.height), int(box.width)), np.bool_)
+    lying = silhouette(frame.depth, int(box.x), int(box.y), mask)
+    view = View.of(DepthView(depth, 1, CAMERA), ColorCodes(color), standing, 1.6)
+    down = View.of(DepthView(frame.depth, 1, CAMERA), ColorCodes(frame.color), lying, 0.36)
+    gallery = Gallery.of(view, 0.0)
+    assert gallery.log_odds(down) != 0, 'while it is not known how tall he is'
+    gallery.learn_height(1.6, 0.0)
+    assert gallery.log_odds(view) > 2
     assert gallery.log_odds(down) == 0
-    assert not gallery.tells_of(down)
-    gallery.learn(down, 1.0)
-    assert gallery.tells_of(down)
-    assert gallery.log_odds(down) > 2
+    assert [gallery.stands(top) for top in (None, 1.2, 0.9, 0.8)] == [True, True, True, False]
 
 
 def _cropped(mask: np.ndarray) -> tuple[int, int, np.ndarray]:

@@ -372,7 +372,8 @@ class BySurface:
         scene, body, motion = account.scene, self.body, self.motion
         claim = account.claim(self.person, seen)
         sigma = motion.sigma
-        placed = body.place(seen, scene.codes, scene.view, motion.position, sigma)
+        stands = self.person.gallery.stands(scene.top(seen))
+        placed = body.place(seen, scene.codes, scene.view, motion.position, sigma, stands)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
         if self._cloud is not None:
@@ -394,7 +395,7 @@ class BySurface:
             height=_misfit(
                 seen.height,
                 body.height,
-                seen.cut.top or seen.cut.bottom or seen.lies,
+                seen.cut.top or seen.cut.bottom or not stands,
                 body.height_known,
             ),
             gone=gone,

@@ -376,11 +376,12 @@ class Account:
 def look_of(scene: Scene, seen: Silhouette) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
-    That is where the image ends below it, or depth does beside the upper end of what shows. Of who
-    lies it is not known how tall he is.
+    That is where the image ends below it, or depth does beside the upper end of what shows. If that
+    is lower than anybody's neck, he leans or falls out of the image, and where what shows is in who
+    stands is not known.
     """
     highest, above = seen.highest(scene.elevation), 0.0
-    top = None if seen.cut.top or seen.lies else highest
+    top = None if seen.cut.top else highest
     ends = seen.ends(scene.view, scene.rim)
     upper = seen.mask[:UPPER]
     beside = (ends.left and upper[:, 0].any()) or (ends.right and upper[:, -1].any())
@@ -389,7 +390,10 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
         least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
         if highest is not None and least < highest < most:
             above = STATURE - highest
-    return View.of(scene.view, scene.codes, seen, top, above)
+    view = View.of(scene.view, scene.codes, seen, top, above)
+    if beside and not ends.top and highest is not None and highest < SEATED:
+        view = replace(view, area=np.zeros_like(view.area))
+    return view
 
 
 def absent(gone: float, misses: int) -> bool:

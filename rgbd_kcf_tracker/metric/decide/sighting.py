@@ -90,7 +90,8 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
     # Where something nearer cuts somebody off, some of his pixels may be another's.
     apart = not (all_sides and (seen.cut.left or seen.cut.right))
-    whole = seen.area > WHOLE and headed and alone and apart
+    stands = person.gallery.stands(view.top)
+    whole = seen.area > WHOLE and headed and alone and apart and stands
     if whole and person.gallery.mixed:
         person.gallery = Gallery()
     if view.top is not None and view.top > 1.2:

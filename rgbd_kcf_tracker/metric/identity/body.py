@@ -110,6 +110,7 @@ class Body:
         view: DepthView,
         expected: FloatArray,
         expected_sigma: FloatArray | None,
+        stands: bool = True,
     ) -> Placed:
         """Take a silhouette as the visible part of the body.
 
@@ -119,13 +120,14 @@ class Body:
             view: the depth.
             expected: ``(3,)`` metres, where the body's reference point is expected.
             expected_sigma: ``(3,)`` metres, or None where nothing better than ``seen`` is known.
+            stands: whether it may stand or sit, so that what is above it may be hidden.
         """
         x, x_sigma = self._across(seen, expected[0])
         y, y_sigma = self._top(seen, expected[1])
         z = seen.depth
         fraction = self._fraction(seen)
         lower = y - expected[1] > 0.08 * self.height
-        partly = lower and fraction < 0.8 and not seen.lies
+        partly = lower and fraction < 0.8 and stands
         if expected_sigma is not None and partly and expected_sigma[1] < 0.3:
             # The head may be hidden without a nearer surface beside it: see whether the colours
             # fit the parts lower down.

@@ -22,7 +22,7 @@ from statistics import median
 import cv2
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import Floats, Mask
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.metric.identity.embedding import Described
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -100,7 +100,6 @@ class View:
         top: metres above the floor of the head's top, None where it is hidden or no floor known.
         grey: whether the camera sees no colours.
         described: how a network describes it; None where there is none, or it was not asked.
-        lies: whether it is of who lies, so that its slices are not those of who stands.
     """
 
     roots: Floats
@@ -109,7 +108,6 @@ class View:
     top: float | None
     grey: bool = False
     described: Described | None = None
-    lies: bool = False
 
     @classmethod
     def of(
@@ -153,7 +151,6 @@ class View:
             np.maximum(color, 1).astype(np.float32),
             top,
             codes.grey,
-            lies=seen.lies,
         )
 
     @cached_property
@@ -174,14 +171,12 @@ class Looks:
     Attributes:
         roots: ``(SLICES, n * LIGHTNESS, TINTS * TINTS)``.
         area, color: ``(n, SLICES)``.
-        lies: ``(n,)`` bool, see :attr:`View.lies`.
         vectors: ``(n, d)``, of a network; NaN for views without, and of no columns if none has one.
     """
 
     roots: Floats
     area: Floats
     color: Floats
-    lies: Mask
     vectors: Floats
 
     def __len__(self) -> int:
@@ -194,7 +189,6 @@ class Looks:
             np.concatenate([v.roots for v in views], axis=1),
             np.stack([v.area for v in views]),
             np.stack([v.color for v in views]),
-            np.array([v.lies for v in views]),
             _stacked([_NONE if v.described is None else v.described.vector[None] for v in views]),
         )
 
@@ -205,7 +199,6 @@ class Looks:
             np.concatenate([each.roots for each in looks], axis=1),
             np.concatenate([each.area for each in looks]),
             np.concatenate([each.color for each in looks]),
-            np.concatenate([each.lies for each in looks]),
             _stacked([each.vectors for each in looks]),
         )
 
@@ -235,8 +228,7 @@ class Compared:
 
     Attributes:
         weight: ``(n, SLICES)`` float32, how much each slice says: by how much of it shows, how
-            colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both, or where
-            only one of them lies.
+            colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both.
         alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
         network: ``(n,)`` float32 log-odds of being the same person by the vectors alone, NaN where
             either has none.
@@ -252,7 +244,6 @@ class Compared:
         common = np.minimum(looks.area, view.area)
         weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
         weight[common < LEAST_SLICE] = 0
-        weight[looks.lies != view.lies] = 0
         # All levels of one against all of the other; the shifts are the diagonals of that.
         cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
         return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2), _network(view, looks))
@@ -393,9 +384,12 @@ class Gallery:
         """Whether one of the views shows all of him."""
         return self._largest >= WHOLE_AREA
 
-    def tells_of(self, view: View) -> bool:
-        """Whether a view can be compared: who is known standing is not known lying down."""
-        return self.looks is None or bool((self.looks.lies == view.lies).any())
+    def stands(self, top: float | None) -> bool:
+        """Whether who is as high as ``top`` metres may stand or sit, and not lie or crawl.
+
+        In who lies nothing is where it is in who stands: no view of him can be compared.
+        """
+        return top is None or self.top is None or top > SEATED * self.top
 
     def log_odds(self, view: View, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
@@ -420,6 +414,8 @@ class Gallery:
         return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
 
     def _log_odds(self, view: View, alike: Sequence[float] | None, views: int) -> float:
+        if not self.stands(view.top):
+            return 0.0
         odds = height_log_odds(view.top, self.top)
         if alike is None or math.isnan(alike[0]):
             return odds

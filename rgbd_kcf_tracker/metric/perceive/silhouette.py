@@ -26,9 +26,6 @@ seam that often lies between two surfaces."""
 CUT_SHARE = 0.3
 """Share of one side's outline beside which something nearer must lie for that side to be cut. At
 0.21 everyone's MOTA was 1.6 points lower, at 0.42 walks at 1 Hz were (docs/experiments.md)."""
-LYING = 0.7
-"""Metres across from which what is broader than high lies: a body with the arms close to it is at
-most as broad when it stands or sits."""
 UPPER = 0.98
 """Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
 _SEAM = np.ones((3, 3), np.uint8)
@@ -113,11 +110,6 @@ class Silhouette:
     area: float
     cut: Sides
     metres: tuple[float, float, float, float]
-
-    @property
-    def lies(self) -> bool:
-        """Whether it is long and low, all of it: nothing in it is where it is in who stands."""
-        return self.width > max(LYING, self.height) and not (self.cut.top or self.cut.bottom)
 
     def ends(self, view: DepthView, rim: Rim) -> Sides:
         """At which sides it reaches the end of what the camera sees."""
