@@ -281,10 +281,14 @@ def test_what_somebody_has_left_whom_it_was_one_figure_with_is_nobody_as_it_does
     targets.everyone = True
     wrong = []
     for sample in islice(simulate('group_crossing', seed=921, rate_hz=10.0, size=(320, 240)), 41):
-        there = [truth.visible for truth in sample.truths.values() if truth.visible is not None]
+        there = [truth.body for truth in sample.truths.values() if truth.body is not None]
         boxes = [track.box for track in targets.update(sample.frame).values()]
         wrong.append(
-            sum(all(box.iou(one) < 0.3 for one in there) for box in boxes if box is not None)
+            sum(
+                all(box.intersection(one) < 0.5 * box.area for one in there)
+                for box in boxes
+                if box is not None
+            )
         )
     assert max(wrong) > 0
     assert wrong[35:] == [0] * 6
