@@ -19,7 +19,7 @@ from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.fading import Lately, about, fading
+from rgbd_kcf_tracker.metric.perceive.fading import Lately, about, around, fading
 from rgbd_kcf_tracker.metric.perceive.paint import DIFFERS, SETTLE, Paint
 from rgbd_kcf_tracker.metric.perceive.room import Room, tolerance
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
@@ -177,7 +177,9 @@ def test_a_third_of_the_tolerance_is_enough_where_colours_say_that_it_is_not_the
         room = Room()
         room.restart(wall, np.zeros_like(unlike))
         now = wall - np.float32(share * allowed)
-        assert room.hardly(now).mean() == (0.35 < share < 1.0)
+        part = np.s_[10:30, 100:140]
+        assert room.hardly(now, part).shape == (20, 40)
+        assert room.hardly(now, part).mean() == (0.35 < share < 1.0)
         room.update(now, STEP, None, surfaces, closer=unlike)
         assert room.before.mean() == pytest.approx(told)
         assert room.still.mean() == pytest.approx(1.0 - told)
@@ -204,6 +206,7 @@ def test_who_shows_less_than_before_fades(area: float, missed: bool, hard: float
         assert where is None
     else:
         assert np.array_equal(where, seen.in_view(depth.shape))
+        assert around([lately]) == np.s_[20:120, 50:90]
         assert about(where).sum() == 104 * 44
 
 

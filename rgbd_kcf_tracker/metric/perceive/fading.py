@@ -56,6 +56,15 @@ class Lately:
         return bool(hard > (1 - FADES) * np.count_nonzero(mask))
 
 
+def around(lately: Sequence[Lately]) -> tuple[slice, slice]:
+    """Rows and columns of a view that hold all of some, one at the least."""
+    rows, cols = ([each.seen.rows for each in lately], [each.seen.cols for each in lately])
+    (top, bottom), (left, right) = (
+        (min(each.start for each in side), max(each.stop for each in side)) for side in (rows, cols)
+    )
+    return slice(top, bottom), slice(left, right)
+
+
 def fading(lately: Sequence[Lately], hardly: Mask) -> Mask | None:
     """Where those were seen last who fade, ``(h, w)`` bool; None for nobody.
 

@@ -228,11 +228,17 @@ class Room:
         nearer: Mask = (depth > 0) & (self.depth > 0) & (self.depth - depth > tolerance(depth))
         return nearer
 
-    def hardly(self, depth: DepthArray) -> Mask:
-        """Pixels, ``(h, w)`` bool, nearer than the room by less than tells them from it."""
-        nearer, allowed = self.depth - depth, tolerance(depth)
+    def hardly(self, depth: DepthArray, part: tuple[slice, slice]) -> Mask:
+        """Pixels of a part of a view, bool, nearer than the room by less than tells them from it.
+
+        Args:
+            depth: ``(h, w)`` metres, of the whole view.
+            part: its rows and columns.
+        """
+        depth, room = depth[part], self.depth[part]
+        nearer, allowed = room - depth, tolerance(depth)
         near: Mask = (nearer > np.float32(CLOSER) * allowed) & (nearer <= allowed)
-        return near & (depth > 0) & (self.depth > 0)
+        return near & (depth > 0) & (room > 0)
 
     def agrees(self, depth: DepthArray) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""

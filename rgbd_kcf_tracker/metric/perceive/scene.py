@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
-from rgbd_kcf_tracker.metric.perceive.fading import STEP, Lately, about, fading
+from rgbd_kcf_tracker.metric.perceive.fading import STEP, Lately, about, around, fading
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.paint import Paint
@@ -235,7 +235,9 @@ class SceneReader:
         unlike = self._paint.differs(self._light.as_before(image)) if lately else None
         if unlike is None:
             return None
-        faded = fading(lately, unlike & self.room.hardly(view.depth))
+        hardly, part = np.zeros_like(unlike), around(lately)
+        hardly[part] = unlike[part] & self.room.hardly(view.depth, part)
+        faded = fading(lately, hardly)
         return None if faded is None else unlike & about(faded)
 
     def _level_after(
