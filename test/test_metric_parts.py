@@ -106,7 +106,7 @@ def test_the_share_of_a_surface_that_is_others_is_that_of_its_pixels():
         assert others.share(scene.silhouette(label)) == pytest.approx(share)
 
 
-def test_something_large_goes_on_beyond_a_piece_of_it_and_not_beyond_somebody_or_a_chair():
+def test_a_piece_of_something_large_is_joined_to_it_and_neither_somebody_nor_a_chair_is():
     """Of two figures that touch, of what is nearer and of what is too small nothing is told."""
     depth = wall()
     depth[30:130, 20:40] = 3.0  # somebody before the wall
@@ -122,7 +122,7 @@ def test_something_large_goes_on_beyond_a_piece_of_it_and_not_beyond_somebody_or
         Silhouette.of(scene.view, left, top, np.ones((height, width), bool), 0, Rim())
         for left, top, width, height in boxes
     ]
-    somebody, seated, piece, beside, speck = Parts(scene, figures).going_on
+    somebody, seated, piece, beside, speck = Parts(scene, figures).joined
     assert somebody == 0.0
     assert seated == 0.0, 'the chair is no larger than he'
     assert piece == 1.0

@@ -372,7 +372,7 @@ class BySurface:
         scene, body, motion = account.scene, self.body, self.motion
         claim = account.claim(self.person, seen)
         sigma = motion.sigma
-        stands = self.person.gallery.stands(scene.top(seen))
+        stands = not self.person.lies(scene.top(seen), account.time)
         placed = body.place(seen, scene.codes, scene.view, motion.position, sigma, stands)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)

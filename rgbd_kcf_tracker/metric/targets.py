@@ -333,13 +333,13 @@ class MetricTargets:
         }
         self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()
-        self._reader.lately = self.account.lately()
         for person, calm, silhouette in self.account.calm:
             self._reader.is_furniture(silhouette)
             self._crowd.is_furniture(person, calm)
             for follower in self._followers.values():
                 if follower.person is person:
                     follower.lose(self._time - calm.since)
+        self._reader.lately = self.account.lately()
         # What a camera that moves sees for the first time, behind something, passes for the room.
         if self._reader.stood_for < SETTLE:
             for number, seen in targets.items():

@@ -96,8 +96,10 @@ class VisitorActor:
             stance.x - back * math.sin(stance.heading), -0.55 * low * self.person.height,
             stance.z + back * math.cos(stance.heading),
         ])  # fmt: skip
+        if stance.lie == 0:
+            return middle
         rotation, offset = stance.fallen(self.person.height)
-        return middle if stance.lie == 0 else rotation @ (middle - offset)
+        return rotation @ (middle - offset)
 
     def shadow(self, t: float) -> float:
         """See `Actor`."""

@@ -116,7 +116,11 @@ class Person:
 
     def hand(self, stance: Stance) -> Vector:
         """Where the right hand is, world frame."""
-        return _Figure(self, stance).arm(1)[2]
+        hand = _Figure(self, stance).arm(1)[2]
+        if stance.lie == 0:
+            return hand
+        rotation, offset = stance.fallen(self.height)
+        return rotation @ (hand - offset)
 
 
 def random_person(

@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
-from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
+from rgbd_kcf_tracker.metric.identity.person import COAST, TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.fading import Lately
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -237,7 +237,7 @@ class Account:
         if look is None and self._is_nearly(seen, index):
             look = float(self.looks[row, index])
         if look is None:
-            look = person.gallery.log_odds(self.look(seen))
+            look = person.log_odds(self.look(seen), self.time)
         rival = mine = 0.0
         assigned = 0 if person.figure and not small else 1
         if index >= 0:
@@ -356,11 +356,12 @@ class Account:
         return person if odds >= (RETURN if person.chosen else self.against) else None
 
     def lately(self) -> list[Lately]:
-        """Those who are surely people and may still be where they were seen last."""
+        """Those who were followed as figures until a moment ago and may still be there."""
         return [
             Lately(person.last, person.area, person.misses > 0)
             for person in self.people
-            if person.last is not None and person.alive and person.hidden
+            if person.last is not None and person.alive and person.hidden and person.figure
+            if self.time - person.seen_at <= COAST
         ]
 
     def somebody(self) -> npt.NDArray[np.bool_]:

@@ -71,7 +71,7 @@ def log_odds(
         likeness = next(rows) if person.gallery.looks is not None else None
         for column, sight in enumerate(sights):
             most = None if likeness is None else likeness[column]
-            looks[row, column] = person.gallery.log_odds(sight.view, most)
+            looks[row, column] = person.log_odds(sight.view, time, most)
         odds[row] = person.place_log_odds(places, time)
         gone = away(time - person.seen_at)
         if person.chosen:

@@ -353,7 +353,7 @@ class Crowd:
                 account.owner[column] = -1
             elif row < 0:
                 small = sight.figure.seen.area < NEW_AREA and not _is_head(account, column)
-                if small or _is_piece(account, column):
+                if small or sight.figure.low or _is_piece(account, column):
                     continue
                 account.owner[column] = len(people)
                 newcomer = self.welcome(sight.figure.place, time)

@@ -21,10 +21,10 @@ Kinds = npt.NDArray[np.uint16]
 
 NOTHING, ROOM, FIRST = 0, 1, 2
 """Kinds of pixels: of nothing known, of the room, of the first of the figures and so on."""
-BEYOND = 3
+OUTSIDE = 3
 """Pixels of the view beyond an outline at which it is asked what goes on there: one beyond the two
 that a seam between two surfaces is wide."""
-STEPS = 0.6
+NO_STEP = 0.6
 """Of the tolerance of the room up to which depth goes on beyond an outline: two deviations."""
 LEAST_OUTLINE = 15
 """Places along an outline that tell of it at the least: fewer are one corner of it."""
@@ -51,8 +51,8 @@ class Parts:
         self._counts: dict[Silhouette, list[int]] = {}
 
     @cached_property
-    def going_on(self) -> list[float | None]:
-        """For each figure the share of its outline beyond which something large goes on.
+    def joined(self) -> list[float | None]:
+        """For each figure the share of its outline where it is joined to something large.
 
         Somebody ends where what is farther shows beside him; a piece of a wall is one surface with
         the rest of it, which is larger than anybody. Whatever else is beside him tells nothing, and
@@ -65,10 +65,10 @@ class Parts:
         images = scene.view.depth, self.kinds, elsewhere, asked, large
         for turned in (np.asarray, np.fliplr, np.transpose, lambda image: np.fliplr(image.T)):
             depth, kinds, outside, beyond, surface = (turned(image) for image in images)
-            here, next_, there = np.s_[:, :-BEYOND], np.s_[:, 1 : 1 - BEYOND], np.s_[:, BEYOND:]
+            here, next_, there = np.s_[:, :-OUTSIDE], np.s_[:, 1 : 1 - OUTSIDE], np.s_[:, OUTSIDE:]
             at = np.nonzero((kinds[here] >= FIRST) & outside[next_] & beyond[there])
             inside, kind = depth[here][at], kinds[here][at]
-            step, noise = depth[there][at] - inside, STEPS * tolerance(inside)
+            step, noise = depth[there][at] - inside, NO_STEP * tolerance(inside)
             same = surface[here][at]
             on = (np.abs(step) <= noise) & (same > 0) & (same == surface[there][at])
             goes_on += np.bincount(kind[on], minlength=self.length)

@@ -13,6 +13,7 @@ from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Gallery
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import HEADED, person_sized, upright
@@ -29,6 +30,8 @@ with what is behind, and feet lie as near to the floor as its depth is uncertain
 VACANT = 0.5
 """Share of a silhouette from which it stands where nobody did before, and not where somebody always
 has: most of it."""
+TENTH = 0.1
+"""Seconds since the last sighting from which one counts as one: at 30 Hz three are."""
 LEAP = 0.5
 """Metres from one sight to the next from which somebody was found, not followed: more than a part
 of him is from another, and than he walks in a third of a second."""
@@ -53,10 +56,10 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
         walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
         person.moved_to(place, account.time, walks)
     person.last, person.figure = seen, index >= 0
-    if index >= 0 and scene.stood_for < math.inf:
-        goes_on = account.parts.going_on[index]
-        if goes_on is not None:
-            person.outline.add(goes_on, 1.0, account.time)
+    if index >= 0 and scene.stood_for < SETTLE:
+        joined = account.parts.joined[index]
+        if joined is not None:
+            person.joined.add(joined, min(gone / TENTH, 1.0), account.time)
     if not sure or (scene.since is None and person.gallery.views):
         return
     person.area = max(person.area, seen.area)
@@ -90,13 +93,13 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
     # Where something nearer cuts somebody off, some of his pixels may be another's.
     apart = not (all_sides and (seen.cut.left or seen.cut.right))
-    stands = person.gallery.stands(view.top)
+    stands = person.gallery.stands(view.top) and view.total > 0
     whole = seen.area > WHOLE and headed and alone and apart and stands
     if whole and person.gallery.mixed:
         person.gallery = Gallery()
     if view.top is not None and view.top > 1.2:
         person.gallery.learn_height(view.top, account.time)
-    if whole or not person.gallery.views:
+    if whole or (view.total > 0 and not person.gallery.views):
         described = account.described(view, box_about(scene, seen))
         person.gallery.learn(described, account.time)
 

@@ -414,8 +414,6 @@ class Gallery:
         return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
 
     def _log_odds(self, view: View, alike: Sequence[float] | None, views: int) -> float:
-        if not self.stands(view.top):
-            return 0.0
         odds = height_log_odds(view.top, self.top)
         if alike is None or math.isnan(alike[0]):
             return odds

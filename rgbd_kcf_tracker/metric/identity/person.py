@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.identity.calm import Calm
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery
+from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -55,15 +55,20 @@ TRAVELLED = 0.5
 BEYOND, EMPTY = 0.3, 0.5
 """Metres behind the last sight of somebody at which the camera sees past its place, and the share
 of its outline where it does so if it has gone."""
-GOES_ON = 0.3
-"""Share of an outline beyond which something large goes on, from which it is of a piece of that and
+JOINED = 0.3
+"""Share of an outline that is joined to something large, from which it is of a piece of that and
 not of somebody: of real and simulated people one sighting in five hundred has it, of pieces of
 walls more than half."""
+FALLS = 0.6
+"""Seconds without a sight in which somebody falls, at the most: some frames at 5 Hz."""
 ANYWHERE = 0.02
 """Probability that somebody just seen is anywhere by now (mistaken before, or hidden): of some
 fifty boxes one is on something else."""
 
-_OF_NOW = 'place', 'velocity', 'seen_at', 'came', 'misses', 'last', 'calm', 'hidden', 'figure'
+_OF_NOW = (
+    *('place', 'velocity', 'seen_at', 'came', 'misses', 'last', 'calm', 'hidden', 'figure'),
+    'joined',
+)
 """Attributes that go along with who is seen where he turns out to be somebody else."""
 
 
@@ -93,8 +98,8 @@ class Person:
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
-        outline: the shares of its outline beyond which depth goes on, of the sightings of late,
-            before a camera that moves.
+        joined: the shares of its outline where it is joined to something large, as seen by a camera
+            that has moved lately.
         again: log-odds that it is one of those who had gone before it came, by its looks alone, see
             :class:`~rgbd_kcf_tracker.metric.decide.arrivals.Arrival`.
     """
@@ -111,7 +116,7 @@ class Person:
         self.last: Silhouette | None = None
         self.calm: Calm | None = None
         self.area, self.again = 0.0, -math.inf
-        self.outline = Tally()
+        self.joined = Tally()
         self._resembles: dict[int, Tally] = {}
         self.gallery = Gallery()
 
@@ -123,8 +128,26 @@ class Person:
     @property
     def _is_piece(self) -> bool:
         """Whether it is a piece of a wall, or of something else that goes on beside it."""
-        goes_on = self.outline.mean if self.outline.enough else None
-        return goes_on is not None and goes_on > GOES_ON
+        joined = self.joined.mean if self.joined.enough else None
+        return joined is not None and joined > JOINED
+
+    def log_odds(self, view: View, time: float, alike: Sequence[float] | None = None) -> float:
+        """Log-odds that a view is of this person by look and height.
+
+        Args:
+            view: the view.
+            time: seconds.
+            alike: see :meth:`Gallery.log_odds`.
+        """
+        return 0.0 if self.lies(view.top, time) else self.gallery.log_odds(view, alike)
+
+    def lies(self, top: float | None, time: float) -> bool:
+        """Whether what is as high as ``top`` metres can be this person only lying or crawling.
+
+        Then nothing is where it is when he stands. He was followed until a moment ago: later on it
+        is no part of him.
+        """
+        return not self.gallery.stands(top) and time - self.seen_at <= FALLS
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""

@@ -20,13 +20,13 @@ from rgbd_kcf_tracker.arrays import Mask
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 STEP = 0.5
-"""Seconds from one frame to the next after which nobody is where he was."""
+"""Seconds from one frame to the next at the most: in more nobody is where he was."""
 FADES = 0.75
 """Share of somebody below which he fades, of the most that was seen of him, as a body turned
 sideways has about as much, and of what was seen last."""
 ABOUT = 5
-"""Pixels of the view, a side of the square about one of his, in which he is in the next frame: who
-sits down does so at half a metre a second."""
+"""Pixels of the view, a side of the square about one of his, in which more of him may show in the
+next frame: some centimetres, and as many again in the one after."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,8 +10,7 @@ between heads (sub-clustering by heads is Munaro and Menegatti's, Autonomous Rob
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -71,11 +70,13 @@ class Figure:
         seen: the silhouette.
         place: ``(2,)`` metres across and along the floor from the camera.
         parted: whether it was cut out of a figure of several, so that its outline is a guess.
+        low: whether it is one only as it is where somebody was, who is in no other: of nobody else.
     """
 
     seen: Silhouette
     place: FloatArray
     parted: bool
+    low: bool = False
 
 
 def depth_step(z: float) -> float:
@@ -98,7 +99,7 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
     part = slice(y, y + height), slice(x, x + width)
     pieces = surfaces_in(scene.view.depth[part], mask[part], JUMP, JUMP_PER_METRE)
     found: list[Figure] = []
-    refused: list[Silhouette] = []
+    refused: list[Figure] = []
     above = np.full(len(pieces), np.inf)
     if scene.elevation is not None:
         above = pieces.means(scene.elevation[part])
@@ -117,12 +118,12 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
             seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
             if seen is None:
                 continue
+            figure = Figure(seen, place_of(scene, seen), len(parts) > 1)
             if makes_figure(scene, seen):
-                found.append(Figure(seen, place_of(scene, seen), len(parts) > 1))
-            elif seen.area > LEAST_AREA:
-                refused.append(seen)
-    found += [Figure(seen, place_of(scene, seen), False) for seen in _low(scene, found, refused)]
-    return found
+                found.append(figure)
+            elif scene.lately and seen.area > LEAST_AREA:
+                refused.append(replace(figure, low=True))
+    return found + _low(scene, found, refused)
 
 
 def _joined(
@@ -199,20 +200,19 @@ def _has_lain_down(scene: Scene, left: int, top: int, mask: Mask) -> bool:
     return here is not None and any(here.meets(each) for each in scene.lately)
 
 
-def _low(scene: Scene, found: list[Figure], refused: list[Silhouette]) -> Iterator[Silhouette]:
-    """Those of the silhouettes that are no figures which are where somebody was who is in none.
+def _low(scene: Scene, found: list[Figure], refused: list[Figure]) -> list[Figure]:
+    """Of those that are no figures the largest where each was who is in none, however low it is."""
+    low: list[Figure] = []
+    for before in scene.lately:
+        if any(_falls_to(before, figure.seen) for figure in found):
+            continue
+        his = [each for each in refused if each not in low and _falls_to(before, each.seen)]
+        if his:
+            low.append(max(his, key=lambda figure: figure.seen.area))
+    return low
 
-    He is one however low he has got.
-    """
-    lost = [
-        each for each in scene.lately if not any(_goes_on(each, figure.seen) for figure in found)
-    ]
-    for seen in refused:
-        if any(_goes_on(each, seen) for each in lost):
-            yield seen
 
-
-def _goes_on(before: Silhouette, seen: Silhouette) -> bool:
+def _falls_to(before: Silhouette, seen: Silhouette) -> bool:
     """Whether a silhouette is about where another was, so that both may be of one who falls."""
     if abs(seen.depth - before.depth) > depth_step(before.depth):
         return False

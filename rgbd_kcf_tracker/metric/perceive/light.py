@@ -64,7 +64,7 @@ class Light:
         return self.as_before(image)
 
     def as_before(self, image: Image) -> Image:
-        """An image likewise, where the light is as it was measured last."""
+        """An image in the light of the first, if the light is as it was measured last."""
         if np.abs(self.gain - 1).max() < UNCHANGED:
             return image
         table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)

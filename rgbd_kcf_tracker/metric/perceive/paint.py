@@ -15,13 +15,11 @@ import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import Image, Mask
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 
 DIFFERS = 30
 """Levels of 255 by which a channel differs from the room's for a pixel to show something else: six
 deviations of a camera's noise, of about 5 levels."""
-SETTLE = 3.0
-"""Seconds after which two thirds of a colour is the new one where the room is seen: as it takes
-what stands still to become part of the room (:data:`~.room.SETTLE`)."""
 
 
 class Paint:
@@ -51,10 +49,13 @@ class Paint:
     def learn(self, image: Image, still: Mask, dt: float) -> None:
         """Take the colours of what an image shows of the room.
 
+        Where it looks otherwise from some time on, two thirds of that are known after the time in
+        which what stands still becomes part of it (:data:`~.room.SETTLE`).
+
         Args:
             image: ``(h, w, 3)`` uint8 BGR, in the light of those before.
             still: ``(h, w)`` bool, the pixels that show it.
-            dt: seconds since the last.
+            dt: seconds since the last that was learned.
         """
         if self._known.shape != still.shape:
             self._colors, self._known = image.astype(np.float32), still.copy()

@@ -397,7 +397,7 @@ class Room:
         self._unlearned += dt
         if farther is None:
             return
-        nearer *= same
+        nearer *= same if closer is None else same & ~closer  # nor is who hardly shows learned
         nearer *= np.float32(BLEND)
         self.depth -= nearer
         again = farther & (np.abs(depth - self._farther) <= allowed)

@@ -165,7 +165,7 @@ class SceneReader:
         self.lately: Sequence[Lately] = ()
         self.last_view: DepthView | None = None
         self.stood_for = math.inf
-        self._unread = 0.0
+        self._unread = self._unpainted = 0.0
 
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
@@ -202,13 +202,19 @@ class SceneReader:
         def upright(whole: bool) -> UprightPeople:
             return upright_people(view, surfaces, elevation, forward, axes[0], rim, whole=whole)
 
-        lately = self.lately if motion is None and seconds <= STEP else ()
+        stands = way is None and view.shape == self.room.depth.shape
+        lately = self.lately if stands and seconds <= STEP else ()
+        if not stands:
+            self._paint.restart()
         closer = self._closer(image, view, lately)
         self._see_room(view, surfaces, rim, upright, motion, seconds, learns, closer)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
+        self._unpainted += seconds
         if learns:
-            self._paint.learn(image, self.room.still, seconds)
+            still = self.room.still if closer is None else self.room.still & ~closer
+            self._paint.learn(image, still, self._unpainted)
+            self._unpainted = 0.0
         return Scene(
             view=view,
             floor=floor,
@@ -308,7 +314,6 @@ class SceneReader:
             self._begun = bool(view.depth.any())
             self.room.restart(view.depth, upright(False).mask)
             self._light.restart()
-            self._paint.restart()
             return
         somebody, undecided = self.somebody, None
         if isinstance(motion, Pose):
@@ -323,7 +328,6 @@ class SceneReader:
             # be what somebody touches.
             undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
             self._light.restart()
-            self._paint.restart()
             somebody = None
         self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided, closer)
 
