@@ -9,6 +9,7 @@ mattress.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 
 import numpy as np
@@ -290,6 +291,11 @@ def test_who_is_half_as_high_as_he_stands_is_not_compared_with_that():
     assert one.log_odds(view, 0.1) > 2
     assert one.log_odds(down, 0.1) == 0
     assert [one.lies(top, 0.1) for top in (None, 1.2, 0.9, 0.8)] == [False, False, False, True]
+    leaning = dataclasses.replace(view, top=None, leans=True)
+    assert one.log_odds(leaning, 0.1) == 0, 'his head is out of the image'
+    unknown = Person(2, np.zeros(2), 0.0)
+    unknown.gallery.learn(leaning, 0.0)
+    assert unknown.log_odds(leaning, 0.1) > 2, 'who was never seen but so is known so'
     assert one.log_odds(down, 5.0) == one.gallery.log_odds(down), (
         'what comes later is no part of him'
     )

@@ -377,9 +377,7 @@ class Account:
 def look_of(scene: Scene, seen: Silhouette) -> View:
     """The look of a silhouette, counted from where the head would be if it is out of sight.
 
-    That is where the image ends below it, or depth does beside the upper end of what shows. If that
-    is lower than anybody's neck, he leans or falls out of the image, and where what shows is in who
-    stands is not known.
+    That is where the image ends below it, or depth does beside the upper end of what shows.
     """
     highest, above = seen.highest(scene.elevation), 0.0
     top = None if seen.cut.top else highest
@@ -391,10 +389,8 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
         least, most = (0.0, HEADED) if ends.top else (SEATED, STATURE)
         if highest is not None and least < highest < most:
             above = STATURE - highest
-    view = View.of(scene.view, scene.codes, seen, top, above)
-    if beside and not ends.top and highest is not None and highest < SEATED:
-        view = replace(view, area=np.zeros_like(view.area))
-    return view
+    leans = bool(beside) and not ends.top and highest is not None and highest < SEATED
+    return replace(View.of(scene.view, scene.codes, seen, top, above), leans=leans)
 
 
 def absent(gone: float, misses: int) -> bool:

@@ -93,13 +93,13 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
     headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
     # Where something nearer cuts somebody off, some of his pixels may be another's.
     apart = not (all_sides and (seen.cut.left or seen.cut.right))
-    stands = person.gallery.stands(view.top) and view.total > 0
+    stands = person.gallery.stands(view.top, view.leans)
     whole = seen.area > WHOLE and headed and alone and apart and stands
     if whole and person.gallery.mixed:
         person.gallery = Gallery()
     if view.top is not None and view.top > 1.2:
         person.gallery.learn_height(view.top, account.time)
-    if whole or (view.total > 0 and not person.gallery.views):
+    if whole or not person.gallery.views:
         described = account.described(view, box_about(scene, seen))
         person.gallery.learn(described, account.time)
 

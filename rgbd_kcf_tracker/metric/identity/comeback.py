@@ -127,7 +127,7 @@ class Comeback:
         self._settled = True
 
     def _look(self, tally: Tally, view: View, time: float) -> None:
-        if time - tally.last >= AGAIN and self.known.stands(view.top):
+        if time - tally.last >= AGAIN and self.known.stands(view.top, view.leans):
             tally.add(self.known.log_odds(view), view.shows**2, time)
 
     @property

@@ -100,6 +100,8 @@ class View:
         top: metres above the floor of the head's top, None where it is hidden or no floor known.
         grey: whether the camera sees no colours.
         described: how a network describes it; None where there is none, or it was not asked.
+        leans: whether the head is out of sight to the side, and what shows ends below where it is
+            when somebody stands: whose height is known leans or falls out of the image.
     """
 
     roots: Floats
@@ -108,6 +110,7 @@ class View:
     top: float | None
     grey: bool = False
     described: Described | None = None
+    leans: bool = False
 
     @classmethod
     def of(
@@ -384,12 +387,15 @@ class Gallery:
         """Whether one of the views shows all of him."""
         return self._largest >= WHOLE_AREA
 
-    def stands(self, top: float | None) -> bool:
+    def stands(self, top: float | None, leans: bool = False) -> bool:
         """Whether who is as high as ``top`` metres may stand or sit, and not lie or crawl.
 
-        In who lies nothing is where it is in who stands: no view of him can be compared.
+        In who lies, or leans out of the image (:attr:`View.leans`), nothing is where it is in who
+        stands: no view of him can be compared.
         """
-        return top is None or self.top is None or top > SEATED * self.top
+        if self.top is None:
+            return True
+        return not leans and (top is None or top > SEATED * self.top)
 
     def log_odds(self, view: View, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.

@@ -139,15 +139,17 @@ class Person:
             time: seconds.
             alike: see :meth:`Gallery.log_odds`.
         """
-        return 0.0 if self.lies(view.top, time) else self.gallery.log_odds(view, alike)
+        return 0.0 if self.lies(view.top, time, view.leans) else self.gallery.log_odds(view, alike)
 
-    def lies(self, top: float | None, time: float) -> bool:
+    def lies(self, top: float | None, time: float, leans: bool = False) -> bool:
         """Whether what is as high as ``top`` metres can be this person only lying or crawling.
+
+        So it is where somebody leans out of the image.
 
         Then nothing is where it is when he stands. He was followed until a moment ago: later on it
         is no part of him.
         """
-        return not self.gallery.stands(top) and time - self.seen_at <= FALLS
+        return not self.gallery.stands(top, leans) and time - self.seen_at <= FALLS
 
     def expected(self, time: float) -> FloatArray:
         """Where it is by now, ``(2,)`` metres."""
