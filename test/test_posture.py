@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.fading import Lately, about, around, fading
 from rgbd_kcf_tracker.metric.perceive.paint import DIFFERS, Paint
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room, tolerance
+from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 from rgbd_kcf_tracker.pose import Pose
@@ -304,3 +305,20 @@ def test_who_is_half_as_high_as_he_stands_is_not_compared_with_that():
 def _cropped(mask: np.ndarray) -> tuple[int, int, np.ndarray]:
     rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     return int(cols[0]), int(rows[0]), mask[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+
+
+@pytest.mark.parametrize('rate', [10, 30])
+def test_the_colours_of_the_room_are_learned_in_the_same_time_at_any_rate(rate: int):
+    """At 30 Hz, where not every frame is learned from, it took three times as long."""
+    reader, (color, depth) = SceneReader(COLS, 0.04, 0.03, 0.02), images([])
+    painted = color.copy()
+    painted[:40] = 255 - painted[:40]
+    step, seen = 1 / rate, []
+    for i in range(round((1.0 + 4 * SETTLE) * rate)):
+        now = color if i < rate else painted
+        assert reader.read(Frame(now, depth, round(1e9 * step * i), CAMERA), step) is not None
+        unlike = reader._paint.differs(now)
+        seen.append(0.0 if unlike is None else float(unlike.mean()))
+    assert max(seen[:rate]) == 0.0
+    assert seen[rate] > 0.1
+    assert seen[-1] < 0.01

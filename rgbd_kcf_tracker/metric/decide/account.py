@@ -390,7 +390,7 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
         if highest is not None and least < highest < most:
             above = STATURE - highest
     leans = bool(beside) and not ends.top and highest is not None and highest < SEATED
-    return replace(View.of(scene.view, scene.codes, seen, top, above), leans=leans)
+    return View.of(scene.view, scene.codes, seen, top, above, leans)
 
 
 def absent(gone: float, misses: int) -> bool:

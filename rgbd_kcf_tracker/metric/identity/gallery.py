@@ -120,6 +120,7 @@ class View:
         seen: Silhouette,
         top: float | None,
         above: float = 0.0,
+        leans: bool = False,
     ) -> View:
         """The look of a silhouette.
 
@@ -129,6 +130,7 @@ class View:
             seen: the silhouette.
             top: metres above the floor of its top, or None.
             above: metres of him that are above the silhouette, where that is known.
+            leans: see :attr:`View.leans`.
         """
         mask = seen.mask.view(np.uint8)
         inner = cv2.erode(mask, np.ones((3, 3), np.uint8), borderValue=0)
@@ -154,6 +156,7 @@ class View:
             np.maximum(color, 1).astype(np.float32),
             top,
             codes.grey,
+            leans=leans,
         )
 
     @cached_property

@@ -142,12 +142,14 @@ class Person:
         return 0.0 if self.lies(view.top, time, view.leans) else self.gallery.log_odds(view, alike)
 
     def lies(self, top: float | None, time: float, leans: bool = False) -> bool:
-        """Whether what is as high as ``top`` metres can be this person only lying or crawling.
+        """Whether this person, followed until a moment ago, would have to lie to be seen so.
 
-        So it is where somebody leans out of the image.
+        Later on what is as low is no part of him.
 
-        Then nothing is where it is when he stands. He was followed until a moment ago: later on it
-        is no part of him.
+        Args:
+            top: metres above the floor of what is seen; None where that is not known.
+            time: seconds.
+            leans: see :attr:`View.leans`.
         """
         return not self.gallery.stands(top, leans) and time - self.seen_at <= FALLS
 

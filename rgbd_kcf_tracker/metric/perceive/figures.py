@@ -10,13 +10,14 @@ between heads (sub-clustering by heads is Munaro and Menegatti's, Autonomous Rob
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import UPPER, Silhouette
@@ -118,11 +119,10 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
             seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
             if seen is None:
                 continue
-            figure = Figure(seen, place_of(scene, seen), len(parts) > 1)
-            if makes_figure(scene, seen):
-                found.append(figure)
-            elif scene.lately and seen.area > LEAST_AREA:
-                refused.append(replace(figure, low=True))
+            made = makes_figure(scene, seen)
+            if made or (scene.lately and seen.area > LEAST_AREA):
+                figure = Figure(seen, place_of(scene, seen), len(parts) > 1, low=not made)
+                (found if made else refused).append(figure)
     return found + _low(scene, found, refused)
 
 
@@ -216,12 +216,8 @@ def _falls_to(before: Silhouette, seen: Silhouette) -> bool:
     """Whether a silhouette is about where another was, so that both may be of one who falls."""
     if abs(seen.depth - before.depth) > depth_step(before.depth):
         return False
-    (top, bottom), (left, right) = (
-        (max(a.start, b.start), min(a.stop, b.stop))
-        for a, b in ((before.rows, seen.rows), (before.cols, seen.cols))
-    )
-    common: int = max(bottom - top, 0) * max(right - left, 0)
-    return common > STAYS * min(before.mask.size, seen.mask.size)
+    was, now = (Box(s.left, s.top, s.mask.shape[1], s.mask.shape[0]) for s in (before, seen))
+    return was.intersection(now) > STAYS * min(was.area, now.area)
 
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:
