@@ -273,7 +273,7 @@ class Follower:
         if found is not None and self._passes(account, surface, found):
             found = None
         if surface.was_away:
-            self._withdraw(surface)
+            self._settle_comeback(surface.person)
             if found is not None:
                 unsure = self._returned(frame, account, dt, surface, found)
                 if unsure is not None:
@@ -378,10 +378,12 @@ class Follower:
             return bool(person.gallery.views)
         return (surface.hidden_for > 0 or dt > REUNION) and person.gallery.whole
 
-    def _withdraw(self, surface: BySurface) -> None:
-        """What was learned of a return that was not borne out is not of the target."""
-        if self._comeback is not None and not self._comeback.borne_out:
-            self._crowd.withdraw(surface.person, self._comeback)
+    def _settle_comeback(self, person: Person) -> None:
+        """The target has gone again: say what was learned since it came back."""
+        if self._comeback is not None:
+            self._comeback.settle(person)
+            if not self._comeback.borne_out:
+                self._crowd.unmeet(person, self._comeback)
         self._comeback = None
 
     def _whole(self, account: Account, person: Person, seen: Silhouette) -> Silhouette | None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from rgbd_kcf_tracker.metric.decide.account import Account
-from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.person import Person
 
@@ -35,10 +34,7 @@ class Comebacks:
         self._comebacks.pop(person.number, None)
 
     def hear(self, account: Account, people: Iterable[Person]) -> None:
-        """Hear how those of all who are known look in a frame, by what was known before.
-
-        What was learned of them since is taken back where some seconds do not bear it out.
-        """
+        """Hear how those of all who are known look in a frame, by what was known before."""
         if not self._comebacks:
             return
         owners = {account.people[row]: n for n, row in enumerate(account.owner) if row >= 0}
@@ -50,5 +46,5 @@ class Comebacks:
                 view = account.sights[owners[person]].view
                 known = account.as_others(person, owners[person])
                 comeback.hear(view, {}, known, account.time)
-            if account.time - comeback.since >= AFTER:
-                comeback.settle(person)
+                if comeback.enough:
+                    comeback.settle(person)

@@ -423,7 +423,7 @@ class Crowd:
         other = self.welcome(person.place, comeback.since)
         person.exchange(other, comeback.since)
         person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
-        for each in self.withdraw(person, comeback):
+        for each in self.unmeet(person, comeback):
             each.meet(other)
 
     def is_furniture(self, person: Person, calm: Calm) -> None:
@@ -433,10 +433,9 @@ class Crowd:
         person.gallery.taken_back(calm.since)
         person.seen_at, person.misses, person.hidden = calm.since, MISSES, False
 
-    def withdraw(self, person: Person, comeback: Comeback) -> list[Person]:
-        """Forget what is known of somebody since a return; gives those who were seen beside him."""
+    def unmeet(self, person: Person, comeback: Comeback) -> list[Person]:
+        """Those who were seen beside somebody since a return may be he himself; gives them."""
         beside = [each for each in self.people if each.number in person.met - comeback.met]
-        person.gallery = comeback.known
         person.met = {each.number for each in self.people} & comeback.met
         for each in beside:
             each.met.discard(person.number)

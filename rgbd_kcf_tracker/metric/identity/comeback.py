@@ -14,17 +14,18 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from rgbd_kcf_tracker.metric.decide.evidence import logit
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
 BORNE_OUT = 2.0
-"""Log-odds (seven to one) from which what was learned since the return is of the target and stays,
-as much as it takes to give an old number to a newcomer
+"""Log-odds (seven to one) from which whoever was beside him since the return is not the target, as
+much as it takes to give an old number to a newcomer
 (:data:`~rgbd_kcf_tracker.metric.decide.account.SAME_AGAIN`)."""
 EVEN = 0.5
 """Probability below which who came back is rather somebody else than the target: no box is shown of
-him, and what was learned of him does not stay."""
+him."""
 DOUBTED = 0.4
 """Probability below which no box is shown any more of who came back, though he is followed on, as
 his looks may yet bear him out: 3 to 2 against him, not even odds, as he was shown from those on and
@@ -74,7 +75,7 @@ class Comeback:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
         self.likely: Likely | None = None
-        self._new, self._settled, self._place = math.exp(against), False, place
+        self._new, self._place = math.exp(against), place
         self._mine, self._others = Tally(), dict[int, Tally]()
 
     def hear(
@@ -121,14 +122,18 @@ class Comeback:
         return self.likely
 
     def settle(self, person: Person) -> None:
-        """Take back what was learned of somebody since, once, where he is rather somebody else."""
-        if not self._settled and self.likely is not None and self.likely.score < EVEN:
-            person.gallery.taken_back(self.since)
-        self._settled = True
+        """What was learned of somebody since is his as surely as it was he who came back."""
+        if self.likely is not None:
+            person.gallery.doubt(self.since, logit(self.likely.score))
 
     def _look(self, tally: Tally, view: View, time: float) -> None:
         if time - tally.last >= AGAIN and self.known.stands(view.top, view.leans):
             tally.add(self.known.log_odds(view), view.shows**2, time)
+
+    @property
+    def enough(self) -> bool:
+        """Whether enough was seen of who came back to believe his looks."""
+        return self._mine.enough
 
     @property
     def denied(self) -> bool:

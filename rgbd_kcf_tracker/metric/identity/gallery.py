@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import median
 
@@ -177,24 +177,35 @@ class Looks:
     Attributes:
         roots: ``(SLICES, n * LIGHTNESS, TINTS * TINTS)``.
         area, color: ``(n, SLICES)``.
+        most: ``(n,)`` float32, how alike a slice of each counts at the most: as much as it is
+            trusted to be of whom it is taken for, see :meth:`Gallery.doubt`.
         vectors: ``(n, d)``, of a network; NaN for views without, and of no columns if none has one.
     """
 
     roots: Floats
     area: Floats
     color: Floats
+    most: Floats
     vectors: Floats
 
     def __len__(self) -> int:
         return len(self.area)
 
     @classmethod
-    def of(cls, views: Sequence[View]) -> Looks:
-        """Stack at least one view."""
+    def of(cls, views: Sequence[View], trust: Sequence[float] = ()) -> Looks:
+        """Stack at least one view.
+
+        Args:
+            views: the views.
+            trust: log-odds that each is of whom it is taken for; none for all that surely are.
+        """
+        even = _even(len(views), views[0].grey)
+        trusted = np.array(trust, np.float32) if trust else np.full(len(views), np.inf, np.float32)
         return cls(
             np.concatenate([v.roots for v in views], axis=1),
             np.stack([v.area for v in views]),
             np.stack([v.color for v in views]),
+            np.float32(even) + trusted / np.float32(STEEPNESS),
             _stacked([_NONE if v.described is None else v.described.vector[None] for v in views]),
         )
 
@@ -205,6 +216,7 @@ class Looks:
             np.concatenate([each.roots for each in looks], axis=1),
             np.concatenate([each.area for each in looks]),
             np.concatenate([each.color for each in looks]),
+            np.concatenate([each.most for each in looks]),
             _stacked([each.vectors for each in looks]),
         )
 
@@ -235,7 +247,8 @@ class Compared:
     Attributes:
         weight: ``(n, SLICES)`` float32, how much each slice says: by how much of it shows, how
             colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both.
-        alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
+        alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1
+            and no more than :attr:`Looks.most`.
         network: ``(n,)`` float32 log-odds of being the same person by the vectors alone, NaN where
             either has none.
     """
@@ -252,7 +265,9 @@ class Compared:
         weight[common < LEAST_SLICE] = 0
         # All levels of one against all of the other; the shifts are the diagonals of that.
         cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
-        return cls(weight, (cross @ _DIAGONALS).transpose(1, 0, 2), _network(view, looks))
+        alike = (cross @ _DIAGONALS).transpose(1, 0, 2)
+        np.minimum(alike, looks.most[:, None, None], out=alike)
+        return cls(weight, alike, _network(view, looks))
 
     def similarity(self) -> Floats:
         """How alike the view is in its colours to each of the others, ``(n,)``, 0 to 1.
@@ -312,6 +327,11 @@ def similarity(view: View, looks: Looks) -> Floats:
     return Compared.of(view, looks).similarity()
 
 
+def _even(views: int, grey: bool) -> float:
+    """Likeness to the most alike of so many views that says nothing."""
+    return (EVEN_GREY if grey else EVEN) + EVEN_PER_VIEW * math.log2(views)
+
+
 def look_log_odds(
     alike: float, area: float, views: int = 1, grey: bool = False, network: float = math.nan
 ) -> float:
@@ -325,8 +345,7 @@ def look_log_odds(
         grey: whether the camera sees no colours.
         network: see :attr:`Compared.network`.
     """
-    even = (EVEN_GREY if grey else EVEN) + EVEN_PER_VIEW * math.log2(views)
-    odds = STEEPNESS * (alike - even)
+    odds = STEEPNESS * (alike - _even(views, grey))
     if not math.isnan(network):
         odds = BESIDE_NETWORK * odds
         odds += min(network - NETWORK_PER_VIEW * math.log2(views), NETWORK_SAME)
@@ -365,6 +384,15 @@ HEIGHT_MEMORY = 25
 """Heights of one person that are remembered: some seconds, so that a stoop does not stay."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Learned:
+    """A view, the seconds when it was seen, and the log-odds that it is of this person."""
+
+    view: View
+    time: float
+    trust: float = math.inf
+
+
 class Gallery:
     """The views by which one is known, and the height of the head.
 
@@ -381,7 +409,7 @@ class Gallery:
         self.views: list[View] = []
         self.looks: Looks | None = None
         self.top: float | None = None
-        self._learned: list[float] = []
+        self._learned: list[_Learned] = []
         self._tops: list[tuple[float, float]] = []
         self._largest = 0.0
 
@@ -419,7 +447,7 @@ class Gallery:
             view: the view.
             alike: its :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
         """
-        old = alike[np.array(self._learned) < time]
+        old = alike[np.array([each.time for each in self._learned]) < time]
         return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
 
     def _log_odds(self, view: View, alike: Sequence[float] | None, views: int) -> float:
@@ -454,20 +482,37 @@ class Gallery:
             if len(self.views) >= MOST_VIEWS:
                 # Of the two most alike the older goes, never the first, which is what was chosen.
                 redundant = self._most_redundant()
-                del self.views[redundant], self._learned[redundant]
-        self._set_views([*self.views, view], [*self._learned, time])
+                del self._learned[redundant]
+        self._set_learned([*self._learned, _Learned(view, time)])
+
+    def doubt(self, since: float, odds: float) -> None:
+        """What was learned from ``since`` on, in seconds, is so likely of this person.
+
+        Who is like a view is this person no surer than the view itself is of him.
+
+        Args:
+            since: seconds.
+            odds: log-odds.
+        """
+        if any(each.time >= since and each.trust > odds for each in self._learned):
+            self._set_learned(
+                [
+                    replace(each, trust=min(each.trust, odds)) if each.time >= since else each
+                    for each in self._learned
+                ]
+            )
 
     def take(self, other: Gallery) -> None:
         """Take all that another gallery has, which has turned out to be of the same person."""
-        for view, time in zip(other.views, other._learned, strict=True):
-            self.learn(view, time)
+        for each in other._learned:
+            self.learn(each.view, each.time)
         self._set_tops(sorted(self._tops + other._tops))
 
     def copy(self) -> Gallery:
         """The same views and heights; what either learns from now on is its own."""
         same = Gallery()
         same.mixed = self.mixed
-        same._set_views(list(self.views), list(self._learned))
+        same._set_learned(list(self._learned))
         same._set_tops(list(self._tops))
         return same
 
@@ -475,15 +520,15 @@ class Gallery:
         """Take back what was learned from ``since`` on, in seconds: it was of somebody else."""
         late = Gallery()
         for gallery, mine in ((late, True), (self, False)):
-            kept = [n for n, time in enumerate(self._learned) if (time >= since) == mine]
-            gallery._set_views([self.views[n] for n in kept], [self._learned[n] for n in kept])
+            gallery._set_learned([each for each in self._learned if (each.time >= since) == mine])
             gallery._set_tops([each for each in self._tops if (each[0] >= since) == mine])
         return late
 
-    def _set_views(self, views: list[View], learned: list[float]) -> None:
-        self.views, self._learned = views, learned
-        self.looks = Looks.of(views) if views else None
-        self._largest = max((each.total for each in views), default=0.0)
+    def _set_learned(self, learned: list[_Learned]) -> None:
+        self._learned, self.views = learned, [each.view for each in learned]
+        trust = [each.trust for each in learned]
+        self.looks = Looks.of(self.views, trust) if learned else None
+        self._largest = max((view.total for view in self.views), default=0.0)
 
     def _set_tops(self, tops: list[tuple[float, float]]) -> None:
         self._tops = tops[-HEIGHT_MEMORY:]
