@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.metric.decide import evidence
 from rgbd_kcf_tracker.metric.decide.arrivals import bounded
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
+from rgbd_kcf_tracker.metric.identity.tally import SUREST, logit
 from rgbd_kcf_tracker.metric.perceive.colors import palette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
@@ -159,8 +160,8 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
             continue
         cues = {name: float(share[list(places)].sum()) for name, places in evidence.CUES}
         cues |= {said.name: said.share for said in candidate.evidence.more}
-        alone = min(max(sum(cues.values()), -evidence.SUREST), evidence.SUREST)
-        beside = evidence.logit(candidate.probability) - alone
+        alone = min(max(sum(cues.values()), -SUREST), SUREST)
+        beside = logit(candidate.probability) - alone
         cues[evidence.OTHER_PLACES] = beside if beside < LEAST_LOSS else 0.0
         doubts = {} if considered else follower.doubts
         cues |= {

@@ -50,7 +50,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import (
 )
 from rgbd_kcf_tracker.metric.decide.association import NEW
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE, NEW_AREA, Crowd
-from rgbd_kcf_tracker.metric.decide.mix_ups import AFTER, HIDDEN_FOR, Followed, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import HIDDEN_FOR, Followed, MixUps
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.drawn import Drawn, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
@@ -82,6 +82,7 @@ from rgbd_kcf_tracker.metric.identity.stood import (
     SUDDENLY,
     Stood,
 )
+from rgbd_kcf_tracker.metric.identity.tally import SUREST, logit
 from rgbd_kcf_tracker.metric.initialisation import surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
@@ -1006,7 +1007,7 @@ def test_what_was_learned_since_a_return_is_his_as_surely_as_it_was_he_who_came_
     assert person.gallery.log_odds(look(BLUE)) > 3, 'nothing was heard yet'
     likely = comeback.hear(look(seen), {}, 0.0, 11.0)
     comeback.settle(person)
-    expected = max(evidence.logit(likely.score), before)
+    expected = max(logit(likely.score), before)
     assert person.gallery.log_odds(look(BLUE)) == pytest.approx(expected, abs=0.05)
     assert person.gallery.log_odds(look(RED)) == pytest.approx(sure, abs=0.7), 'one view more'
 
@@ -1435,8 +1436,8 @@ def test_what_was_learned_in_a_return_that_is_not_borne_out_tells_nobody(chosen)
     account = watched.see(Someone(0.05, 3.0))
     assert who(account, 0) is one
     assert len(one.gallery.views) == views + 1, 'more of him may show'
-    for _ in range(2):
-        watched.see(dt=AFTER / 2)
+    for _ in range(4):
+        watched.see(Someone(0.05, 3.0), dt=0.2)
     # Who was chosen is asked for elsewhere whether he is the one who came back.
     assert (one.gallery.log_odds(look(BLUE, GREY)) > 0) == chosen
 
@@ -2902,7 +2903,7 @@ def test_what_lowers_the_score_of_who_came_back_is_among_its_cues():
         track = targets.update(picture(people, 6.3 + 0.1 * i, DESK if i < 14 else None))[number]
         considered = of_metric(targets, number).considered
         for one in considered:
-            odds = min(max(sum(one.cues.values()), -evidence.SUREST), evidence.SUREST)
+            odds = min(max(sum(one.cues.values()), -SUREST), SUREST)
             assert 1 / (1 + np.exp(-odds)) == pytest.approx(one.probability, abs=1e-3)
         assert all(one.cues[cue] == 0 for one in considered[1:] for cue in said)
         if track.box is not None:

@@ -26,7 +26,8 @@ from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState, create_t
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.errors import RecordingError
 from rgbd_kcf_tracker.insight import Insight, insight_of
-from rgbd_kcf_tracker.metric.decide.evidence import OTHER_PLACES, SUREST
+from rgbd_kcf_tracker.metric.decide.evidence import OTHER_PLACES
+from rgbd_kcf_tracker.metric.identity.tally import SUREST
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import default_parameters
 from rgbd_kcf_tracker.view import player as module

@@ -22,7 +22,6 @@ from rgbd_kcf_tracker.metric.decide.evidence import (
     WHERE_IT_STOOD,
     Evidence,
     Said,
-    logit,
     probability,
 )
 from rgbd_kcf_tracker.metric.decide.expected_body import ExpectedBody
@@ -41,6 +40,7 @@ from rgbd_kcf_tracker.metric.identity.middle import Belief, MiddleFilter
 from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
+from rgbd_kcf_tracker.metric.identity.tally import logit
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene

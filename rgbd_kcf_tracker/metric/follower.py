@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
-from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW, logit
+from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
 from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike, view_in
@@ -34,6 +34,7 @@ from rgbd_kcf_tracker.metric.identity.middle import (
 )
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stood import Stood
+from rgbd_kcf_tracker.metric.identity.tally import logit
 from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView

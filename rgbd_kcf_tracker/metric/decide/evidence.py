@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.metric.identity.tally import SUREST
+
 FADE = 1.0
 """Seconds after which a hidden target's last place says a third of what it said: within one a
 walker may have gone farther in any direction than a body is broad. :data:`WEIGHTS` are fitted with
@@ -135,10 +137,6 @@ order. They come from a logistic regression on proposals that the tracker met on
 people, each right or wrong by the truth; ``evaluation.evidence_fit`` fits them again, and
 docs/figures.md says on what these were fitted. Hand-set ones were as good, but not calibrated."""
 
-SUREST = 30.0
-"""Log-odds beyond which nothing is surer: ten to the thirteenth to one, about the last that a
-double tells from certainty."""
-
 CUES = (
     ('place', (0, 1, 2)),
     ('look', (12, 13)),
@@ -183,13 +181,6 @@ CUE_WORDS = {
     KNOWN_BEFORE: 'after an absence: how alike it is to the target before, and to others as well',
 }
 """What each of :data:`CUES` says, and of those that only the likeliest has."""
-
-
-def logit(probability: float) -> float:
-    """Log-odds of a probability, at most :data:`SUREST` either way."""
-    least = math.exp(-SUREST)
-    odds = math.log(max(probability, least) / max(1.0 - probability, least))
-    return min(max(odds, -SUREST), SUREST)
 
 
 def probability(evidence: Evidence) -> float:

@@ -14,10 +14,9 @@ import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from rgbd_kcf_tracker.metric.decide.evidence import logit
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
-from rgbd_kcf_tracker.metric.identity.tally import Tally
+from rgbd_kcf_tracker.metric.identity.tally import Tally, logit
 
 BORNE_OUT = 2.0
 """Log-odds (seven to one) from which whoever was beside him since the return is not the target, as

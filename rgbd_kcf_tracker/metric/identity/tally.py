@@ -1,11 +1,15 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What several sightings of the same say together."""
+"""Log-odds, and what several sightings of the same say together."""
 
 from __future__ import annotations
 
 import math
+
+SUREST = 30.0
+"""Log-odds beyond which nothing is surer: ten to the thirteenth to one, about the last that a
+double tells from certainty."""
 
 ENOUGH = 1.5
 """Sightings, counted by how much showed, from which they are believed: more than any one of them,
@@ -19,6 +23,13 @@ those of whom little shows."""
 AGAIN = 0.25
 """What twice as many sightings say more, as a share of what one says: little, as those that follow
 each other show nearly the same."""
+
+
+def logit(probability: float) -> float:
+    """Log-odds of a probability, at most :data:`SUREST` either way."""
+    least = math.exp(-SUREST)
+    odds = math.log(max(probability, least) / max(1.0 - probability, least))
+    return min(max(odds, -SUREST), SUREST)
 
 
 class Tally:
