@@ -62,7 +62,12 @@ def launch_modules(monkeypatch: pytest.MonkeyPatch) -> None:
         for kind in classes:
             setattr(module, kind, type(kind, (Remembered,), {}))
         monkeypatch.setitem(sys.modules, name, module)
-    packages = SimpleNamespace(get_package_share_directory=lambda _: str(PROJECT))
+    packages = SimpleNamespace(
+        get_package_share_directory=lambda _: str(PROJECT),
+        get_packages_with_prefixes=lambda: dict.fromkeys(
+            ('opennav_following', 'nav2_lifecycle_manager'), '/opt/ros/jazzy'
+        ),
+    )
     monkeypatch.setitem(sys.modules, 'ament_index_python', ModuleType('ament_index_python'))
     monkeypatch.setitem(sys.modules, 'ament_index_python.packages', packages)
     # It may have been imported with others.
