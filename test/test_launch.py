@@ -260,6 +260,20 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
     NodeParameters(**settings['/**']['ros__parameters'])
 
 
+def test_a_rate_that_is_given_is_the_pace(launch_modules: None) -> None:
+    """In lock-step, the default, nobody would see it."""
+
+    def pace(**given: str) -> tuple[float, bool]:
+        parameters, _ = start_replay(bag='walk.mcap', **given)
+        return parameters['rate'], parameters['lockstep']
+
+    assert pace() == (1.0, True)
+    assert pace(rate='0.5') == (0.5, False)
+    assert pace(lockstep='no') == (1.0, False)
+    with pytest.raises(ParameterError, match='in lock-step the tracker sets the pace'):
+        pace(rate='2', lockstep='true')
+
+
 def test_replay_plays_the_camera_that_the_tracker_hears(launch_modules: None) -> None:
     """One of several in the recording, in lock-step with a tracker in a namespace."""
     parameters, passed = start_replay(bag='walk.mcap', camera='kinect2_hd', namespace='left')
