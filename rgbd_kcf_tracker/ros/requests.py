@@ -106,7 +106,10 @@ class Requests:
             if settings.auto_init:
                 from rgbd_kcf_tracker.live.auto_init import AutoInit
 
-                auto = AutoInit(settings)
+                try:
+                    auto = AutoInit(settings)
+                except RgbdKcfError as error:
+                    self._fault(REJECTED, f'auto_init: {error}')
             again = settings.auto_init_again
             self._in_worker('auto_init', lambda: self._session.choose_by_itself(auto, again))
 
