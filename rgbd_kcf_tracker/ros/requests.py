@@ -90,8 +90,10 @@ class Requests:
 
     def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """``~/reset``: drop the target."""
+        dropped = self._session.following
         self._in_worker('reset', self._session.reset)
-        response.success, response.message = True, 'target dropped'
+        response.message = 'target dropped' if dropped else 'there was no target'
+        response.success = True
         return response
 
     def from_parameters(self, names: frozenset[str]) -> None:
