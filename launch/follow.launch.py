@@ -14,7 +14,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch_ros.actions import Node
 
 from launch import LaunchContext, LaunchDescription
-from rgbd_kcf_tracker.ros.launching import CONFIG, a_file, declared, given, is_true, switches
+from rgbd_kcf_tracker.ros.launching import CONFIG, a_file, declared, given, is_true, need, switches
 
 ARGUMENTS = {
     'follow_file': (
@@ -28,6 +28,7 @@ ARGUMENTS = {
     'name': ('tracker', 'Name of the tracker node.'),
     'use_sim_time': ('', 'true: take the time from /clock; empty for the files of parameters.'),
 }
+SERVER = ('opennav_following', 'nav2_lifecycle_manager')
 
 
 def start(context: LaunchContext) -> list:
@@ -35,6 +36,9 @@ def start(context: LaunchContext) -> list:
     values = given(ARGUMENTS, context)
     common = switches(values, 'use_sim_time')
     namespace, file = values['namespace'], a_file(values, 'follow_file')
+    server = is_true(values, 'server')
+    if server:
+        need(SERVER, 'give server:=false where a Following Server runs already')
     actions = [
         IncludeLaunchDescription(
             PythonLaunchDescriptionSource(str(CONFIG.parent / 'launch' / 'tracker.launch.py')),
@@ -54,10 +58,10 @@ def start(context: LaunchContext) -> list:
             output='screen',
         ),
     ]
-    if is_true(values, 'server'):
+    if server:
         actions += [
             Node(
-                package='opennav_following',
+                package=SERVER[0],
                 executable='opennav_following',
                 name='following_server',
                 namespace=namespace,
@@ -66,7 +70,7 @@ def start(context: LaunchContext) -> list:
                 output='screen',
             ),
             Node(
-                package='nav2_lifecycle_manager',
+                package=SERVER[1],
                 executable='lifecycle_manager',
                 name='lifecycle_manager_following',
                 namespace=namespace,

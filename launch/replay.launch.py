@@ -16,6 +16,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
+from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.live.camera_profiles import NO_CAMERA
 from rgbd_kcf_tracker.live.replay_source import FOLDER_TOPICS
 from rgbd_kcf_tracker.recordings.sequences import is_sequence_folder
@@ -43,9 +44,9 @@ ARGUMENTS = {
     'params_file': (str(CONFIG / 'replayed.yaml'), 'Parameters of the tracker node.'),
     'namespace': ('', 'Namespace of the tracker.'),
     'name': ('tracker', 'Name of the tracker node.'),
-    'rate': ('1.0', 'Speed, without lock-step.'),
+    'rate': ('', 'Speed, which takes it out of lock-step; empty for 1 where it is out already.'),
     'loop': ('false', 'Begin again at the end.'),
-    'lockstep': ('true', 'Wait for the answer to each frame.'),
+    'lockstep': ('', 'Wait for the answer to each frame; empty for true, unless rate is given.'),
 }
 TRACKER = (*CAMERA, 'init_box', 'variant', 'params_file', 'namespace', 'name')
 
@@ -56,13 +57,18 @@ def start(context: LaunchContext) -> list:
     folder = is_sequence_folder(Path(values['bag']))
     if not values['camera']:
         values['camera'] = NO_CAMERA if folder else CAMERA['camera'][0]
+    lockstep = is_true(values, 'lockstep') if values['lockstep'] else not values['rate']
+    if lockstep and values['rate']:
+        raise ParameterError(
+            'launch arguments rate and lockstep: in lock-step the tracker sets the pace, give one'
+        )
     _, remappings = chosen_camera(values)
     topics = dict(remappings)
     parameters = {
         'bag': ParameterValue(values['bag'], value_type=str),
-        'rate': number(values, 'rate', float),
+        'rate': number(values, 'rate', float) if values['rate'] else 1.0,
         'loop': is_true(values, 'loop'),
-        'lockstep': is_true(values, 'lockstep'),
+        'lockstep': lockstep,
         'answer_topic': f'{full_name(context, values)}/box',
     }
     if folder:

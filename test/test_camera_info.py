@@ -310,6 +310,20 @@ def test_live_messages_are_read_by_the_same_rule() -> None:
         )
     assert not faults
     assert max(errors(published)) < CLOSE
+    # no point of the plane shows there through this lens
+    strange = replace(camera.intrinsics, lens=Lens((1e10,) * 5))
+    session.reset()
+    session.choose(lambda _: box)
+    processor(
+        Capture(
+            image(10**9, encode_color(frame.color)),
+            image(10**9, encode_depth(frame.depth)),
+            camera._replace(intrinsics=strange),
+            10**9,
+        )
+    )
+    assert published[-1] is None
+    assert 'lens of camera_info cannot be taken out at the target' in faults.pop()
     # the whole sensor's picture is not this camera's
     whole, _ = Sensor('equidistant').shot(PLACES[0], 9)
     capture = Capture(image(10**9, encode_color(whole.color)), None, camera, 10**9)

@@ -445,7 +445,7 @@ def test_warnings_are_not_endless(tmp_path: Path, capsys: pytest.CaptureFixture[
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 21
     assert 'further warnings are not shown' in lines[-1]
-    assert main(['info', str(source), '--check']) == 0
+    assert main(['info', str(source), '--check']) == 1
     assert capsys.readouterr().out.count('read without depth') == 27
 
 
@@ -473,9 +473,23 @@ def test_info_checks_every_frame(tmp_path: Path, capsys: pytest.CaptureFixture[s
     (source / 'depth' / '000006.png').write_bytes(b'no image')
     assert main(['info', str(source), '--check']) == 1
     text = capsys.readouterr().out
-    assert 'checked       12 frames, 1 damaged' in text
-    assert 'damaged: ' in text
+    assert 'checked       12 frames, 2 damaged' in text
+    assert text.count('damaged: ') == 2
     assert '000006.png' in text
+    assert main(['info', str(source), '--check', '--json']) == 1
+    check = json.loads(capsys.readouterr().out)['check']
+    assert (check['frames'], len(check['damaged']), check['warnings']) == (12, 2, [])
+
+
+def test_a_bag_whose_depth_cannot_be_read_does_not_pass_the_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sent = camera_messages(make_frames(3))
+    depth = next(s for s in sent if s.topic == DEPTH)
+    depth.message.data = depth.message.data[:100]
+    source = write_mcap(tmp_path / 'a.mcap', sent)
+    assert main(['info', str(source), '--check']) == 1
+    assert 'checked       3 frames, 1 damaged' in capsys.readouterr().out
 
 
 ENVIRONMENT = os.environ | {'PYTHONPATH': os.pathsep.join(sys.path)}

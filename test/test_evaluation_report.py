@@ -586,6 +586,13 @@ def test_a_folder_in_which_nothing_was_measured_goes_if_it_was_made_for_it(
     assert (tmp_path / 'old' / 'failures.txt').exists()
 
 
+def test_a_recording_of_one_frame_measures_nothing(tmp_path: Path, capsys):
+    write_scene(tmp_path / 'one', 1, 2)
+    words = ['evaluate', str(tmp_path / 'one'), '--variants', 'kcf', '--jobs', '1', '--report']
+    assert main([*words, str(tmp_path / 'report')]) == 2
+    assert 'nothing was measured: there is no frame to judge after' in capsys.readouterr().err
+
+
 def test_tables_of_the_report_before_go_and_nothing_else(scenes: Path, tmp_path: Path):
     report = tmp_path / 'report'
     words = ['evaluate', str(scenes), '--variants', 'kcf', '--jobs', '1', '--report', str(report)]

@@ -135,6 +135,19 @@ def test_the_launch_file_starts_tracker_server_and_who_asks(launch_modules: None
     FollowParameters(**content['/**/follow']['ros__parameters'])
 
 
+def test_without_the_following_server_nothing_is_started(
+    launch_modules: None,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Launch ends without what it has started by then, the tracker, which would live on."""
+    packages = sys.modules['ament_index_python.packages']
+    installed = {'nav2_lifecycle_manager': '/opt/ros/jazzy'}
+    monkeypatch.setattr(packages, 'get_packages_with_prefixes', lambda: installed)
+    with pytest.raises(ParameterError, match=r'install ros-\w+-opennav-following, or .*server:='):
+        start_follow()
+    assert set(start_follow(server='false')) == {'IncludeLaunchDescription', 'follow'}
+
+
 def test_the_server_waits_longer_than_the_tracker_predicts_and_stops_before_it_is_told() -> None:
     content = yaml.safe_load((PROJECT / 'config' / 'follow.yaml').read_text(encoding='utf-8'))
     server = content['/**/following_server']['ros__parameters']

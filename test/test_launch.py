@@ -62,7 +62,12 @@ def launch_modules(monkeypatch: pytest.MonkeyPatch) -> None:
         for kind in classes:
             setattr(module, kind, type(kind, (Remembered,), {}))
         monkeypatch.setitem(sys.modules, name, module)
-    packages = SimpleNamespace(get_package_share_directory=lambda _: str(PROJECT))
+    packages = SimpleNamespace(
+        get_package_share_directory=lambda _: str(PROJECT),
+        get_packages_with_prefixes=lambda: dict.fromkeys(
+            ('opennav_following', 'nav2_lifecycle_manager'), '/opt/ros/jazzy'
+        ),
+    )
     monkeypatch.setitem(sys.modules, 'ament_index_python', ModuleType('ament_index_python'))
     monkeypatch.setitem(sys.modules, 'ament_index_python.packages', packages)
     # It may have been imported with others.
@@ -253,6 +258,20 @@ def test_replay_passes_only_what_the_tracker_takes(launch_modules: None) -> None
     assert set(parameters) <= set(ReplayParameters.__dataclass_fields__)
     settings = yaml.safe_load((PROJECT / 'config' / 'replayed.yaml').read_text(encoding='utf-8'))
     NodeParameters(**settings['/**']['ros__parameters'])
+
+
+def test_a_rate_that_is_given_is_the_pace(launch_modules: None) -> None:
+    """In lock-step, the default, nobody would see it."""
+
+    def pace(**given: str) -> tuple[float, bool]:
+        parameters, _ = start_replay(bag='walk.mcap', **given)
+        return parameters['rate'], parameters['lockstep']
+
+    assert pace() == (1.0, True)
+    assert pace(rate='0.5') == (0.5, False)
+    assert pace(lockstep='no') == (1.0, False)
+    with pytest.raises(ParameterError, match='in lock-step the tracker sets the pace'):
+        pace(rate='2', lockstep='true')
 
 
 def test_replay_plays_the_camera_that_the_tracker_hears(launch_modules: None) -> None:

@@ -229,6 +229,19 @@ def test_a_ros1_bag_is_replayed(shared_data: Path, tmp_path: Path) -> None:
     assert heard.boxes == []  # the tracker listens to other names
 
 
+def test_who_is_stopped_while_he_waits_has_sent_nothing(bag: Path, tmp_path: Path) -> None:
+    process = rig.start('replay_main', folder=tmp_path, bag=str(bag), wait_for_subscribers=60.0)
+    said = ''
+    assert process.stdout is not None
+    while 'waiting for a subscriber' not in said:
+        said += process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    said += process.communicate(timeout=30)[0]
+    assert process.returncode == 0
+    assert 'stopped before anything was sent' in said
+    assert 'replaying' not in said
+
+
 def test_lockstep_without_a_tracker_says_what_is_missing(bag: Path, tmp_path: Path) -> None:
     status, output = rig.run_replay(tmp_path, bag=str(bag), lockstep=True, wait_for_subscribers=0.5)
     assert status == 2

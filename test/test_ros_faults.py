@@ -369,7 +369,8 @@ def test_unknown_encoding(live: Live) -> None:
         rig.send_depth(index)
     live.answered(since, 3)
     assert rig.box() is None
-    live.says('bad_color', "unknown colour encoding 'bayer_magic'")
+    said = "/color/image: colour image cannot be read: unknown colour encoding 'bayer_magic'"
+    live.says('bad_color', said)
     rig.color.publish(image_message(rig.header(first + 3), scene(0)[0], 'bayer_' + 'x' * 100_000))
     rig.send_depth(first + 3)
     live.answered(since, 4)

@@ -528,6 +528,22 @@ def test_restarts_are_counted_over_all_configurations() -> None:
         assert statistics.snapshot().counts['restarts'] == sum_of_restarts
 
 
+@pytest.mark.parametrize(('apart_s', 'begun_anew'), [(0, 0), (5, 1)])
+def test_two_publishers_are_no_bag_that_loops(apart_s: int, begun_anew: int) -> None:
+    """Each second image went back, and with each the target was dropped."""
+    silent = SimpleNamespace(
+        image_wanted=False, publish=lambda _: None, publish_extras=lambda _: None
+    )
+    statistics, anew = Statistics(), []
+    process = Processor(session()[0], silent, statistics, time.time_ns, statistics.error)
+    process.on_restart = lambda: anew.append(1)
+    for index in range(80):
+        other = apart_s * 10**9 if index > 20 and index % 2 else 0
+        image = message(BASE + index * 33 * MS - other)
+        process(Capture(image, None, None, index * 33 * MS))
+    assert len(anew) == begun_anew
+
+
 def until(condition: Callable[[], object]) -> None:
     end = time.monotonic() + 30
     while not condition():

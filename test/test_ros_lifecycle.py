@@ -254,8 +254,6 @@ def test_parameters_while_running(rig: Rig) -> None:
         assert not set_parameter(rig, 'queue_policy', 'newest').successful
         assert not set_parameter(rig, 'kcf.padding', 'wide').successful
         assert not set_parameter(rig, 'init_box', '1,2,3').successful
-        refused = set_parameter(rig, 'auto_init_far', 0.4)
-        assert 'auto_init_near is 0.5 and auto_init_far 0.4' in refused.reason
         # An integer is taken for a double, and it reaches the tracker.
         assert set_parameter(rig, 'kcf.padding', 2).successful
         assert node.get_parameter('kcf.padding').value == 2.0
@@ -264,6 +262,21 @@ def test_parameters_while_running(rig: Rig) -> None:
         assert set_parameter(rig, 'init_box', [float(v) for v in scene(6)[2].as_tuple()]).successful
         rig.play([6])
         assert rig.box().as_tuple() == scene(6)[2].as_tuple()
+
+
+def test_a_pair_is_set_in_any_order(rig: Rig) -> None:
+    """As `ros2 param load` does, one by one; while nobody can be between them, that is said."""
+    with running_node(rig, auto_init=True) as node:
+        session = node._session
+        assert set_parameter(rig, 'auto_init_far', 0.4).successful
+        said = rig.fresh_values()
+        assert (
+            'auto_init_near is 0.5 and auto_init_far 0.4: nobody is between' in said['last_error']
+        )
+        assert session._auto is None
+        assert set_parameter(rig, 'auto_init_near', 0.2).successful
+        rig.wait(lambda: session._auto is not None)
+        assert rig.fresh_values()['rejected_requests'] == '1'
 
 
 def test_integers_for_doubles_and_lists_for_boxes_are_taken(rig: Rig) -> None:

@@ -235,8 +235,11 @@ def test_the_log_says_what_happens_and_answers_every_wrong_request(rig: Rig) -> 
             rejected = f'{x // 1000}'
             rig.wait(lambda n=rejected: rig.values().get('rejected_requests') == n)
         assert reset.wait_for_service(20)
-        reset.call_async(Trigger.Request())
-        rig.wait(lambda: rig.values()['state'] == 'IDLE')
+        for words in ('target dropped', 'there was no target'):
+            answer = reset.call_async(Trigger.Request())
+            rig.wait(answer.done)
+            assert answer.result().message == words
+            rig.wait(lambda: rig.values()['state'] == 'IDLE')
         process.send_signal(signal.SIGINT)
         said = process.communicate(timeout=30)[0]
     lines = [line.partition('[tracker]: ')[2] for line in said.splitlines()]

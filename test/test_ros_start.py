@@ -88,7 +88,15 @@ def test_what_cannot_be_understood_is_refused(
         ('init_box:="nan,2,3,4"', 'box x is nan: it must be finite: give x,y,width,height'),
         (
             'qos_overrides./color/image.subscription.reliability:=magic',
-            'Unexpected QoS override',
+            "/color/image.subscription.reliability is 'magic': choose one of system_default, ",
+        ),
+        (
+            'qos_overrides./depth/image.subscription.reliability:=1',
+            '/depth/image.subscription.reliability is 1: it must be text',
+        ),
+        (
+            'qos_overrides./color/camera_info.subscription.history:=keep_some',
+            "history is 'keep_some': choose one of system_default, keep_last, keep_all",
         ),
         (
             'qos_overrides./color/image.subscription.depth:=ten',

@@ -366,7 +366,8 @@ def test_images_are_shown_as_they_come(
             node._on_color(image_message(header, color, 'bgr8'))
             node._on_depth(image_message(header, depth, '16UC1'))
             if answers_after is not None and number >= answers_after:
-                node._on_state(TrackMessages(ROS_TYPES).state(headers[number - answers_after], []))
+                answer = TrackMessages(ROS_TYPES).state(headers[number - answers_after], [])
+                node._on_state(answer, {'publication_sequence_number': None})
         stamps = [stamp_of(SimpleNamespace(header=header)) for header in headers]
         answered = stamps[: len(stamps) - (answers_after or 0)]
         assert shown[-15:] == [(stamp, True) for stamp in answered][-15:]
@@ -408,6 +409,32 @@ def test_the_rate_that_is_asked_for_is_reached(
             page.image(Frame(np.zeros((12, 16, 3), np.uint8)), number)
             shown += 1
     assert abs(shown - 10 * expected) <= 2
+
+
+def test_a_tracker_that_is_configured_anew_follows_others(rig: Rig) -> None:
+    """Its ids begin at 1 again: nobody has the name of who was there before."""
+    with running_node(rig, init_box='140,90,36,60') as tracker, running_viewer() as (_, server):
+        look = Look(server)
+
+        def name() -> str:
+            return look.headers[-1]['targets'][0]['name'] if answered() else ''
+
+        def answered() -> bool:
+            return bool(look.headers and look.headers[-1]['targets'])
+
+        until(rig, answered)
+        look.ask(do='rename', id=1, name='Anna')
+        until(rig, lambda: name() == 'Anna')
+        tracker.trigger_deactivate()
+        tracker.trigger_activate()
+        seen = len(look.headers)
+        until(rig, lambda: len(look.headers) > seen + 5 and answered())
+        assert name() == 'Anna'
+        tracker.trigger_deactivate()
+        tracker.trigger_cleanup()
+        tracker.autostart()
+        until(rig, lambda: name() == 'target 1')
+        look.close()
 
 
 def test_the_tracker_goes_on_when_the_viewer_ends(rig: Rig) -> None:

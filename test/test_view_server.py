@@ -500,15 +500,15 @@ def test_other_addresses_need_a_token_that_is_long_enough(stub: Stub) -> None:
 
 def test_a_port_that_is_taken_is_said(server: Server, stub: Stub) -> None:
     port = int(server.url.rsplit(':', 1)[1].strip('/'))
-    with pytest.raises(ParameterError, match='--port'):
+    with pytest.raises(ParameterError, match='name another port'):
         Server(stub, port=port).start()
-    with pytest.raises(ParameterError, match='--port'):
+    with pytest.raises(ParameterError, match='name another port'):
         Server(stub, port=99999).start()
 
 
 @pytest.mark.parametrize('host', ['nope.invalid', 'a' * 80])
 def test_a_host_that_is_none_is_said(stub: Stub, host: str) -> None:
-    with pytest.raises(ParameterError, match=f"'{host}' is no name .* --host"):
+    with pytest.raises(ParameterError, match=f"'{host}' is no name .* another host"):
         Server(stub, host=host, token='long enough').start()
 
 

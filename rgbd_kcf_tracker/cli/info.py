@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -40,22 +39,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it; the exit code is 1 where ``--check`` finds frames that cannot be read, else 0."""
+    """Print it; the exit code is 1 where ``--check`` finds damaged images, else 0."""
     from rgbd_kcf_tracker.recordings.opening import describe_recording
 
     options = read_options(args)
     info = describe_recording(args.source, options)
-    print(json.dumps(_as_dict(info), indent=2) if args.json else _as_text(info))
-    return _check(args, options) if args.check and not info.problem else 0
+    if not args.json:
+        print(_as_text(info))
+    check = _check(args.source, options) if args.check and not info.problem else None
+    if args.json:
+        checked = {} if check is None else {'check': check}
+        print(json.dumps(_as_dict(info) | checked, indent=2))
+    elif check is not None:
+        for kind in ('damaged', 'warnings'):
+            for text in check[kind]:
+                print(f'{kind.removesuffix("s")}: {escaped(text)}')
+        print(
+            f'checked       {check["frames"]} frames, {len(check["damaged"])} damaged, '
+            f'{check["frames_per_s"]:.0f} frames/s'
+        )
+    return 1 if check is not None and check['damaged'] else 0
 
 
-def _check(args: argparse.Namespace, options: ReadOptions) -> int:
+def _check(source: str, options: ReadOptions) -> dict[str, Any]:
     """Decode each frame by itself, so that one that is damaged does not hide the next."""
     from rgbd_kcf_tracker.recordings import open_recording
+    from rgbd_kcf_tracker.recordings.recording import WITHOUT_DEPTH
 
-    out = sys.stderr if args.json else sys.stdout
-    damaged = 0
-    with open_recording(args.source, options) as recording:
+    damaged: list[str] = []
+    with open_recording(source, options) as recording:
         told = len(recording.warnings)
         begun = time.perf_counter()
         for number in progress(range(len(recording)), len(recording), 'check'):
@@ -63,17 +75,15 @@ def _check(args: argparse.Namespace, options: ReadOptions) -> int:
                 for _ in recording.frames(number, number + 1):
                     pass
             except RgbdKcfError as error:
-                damaged += 1
-                print(f'damaged: {escaped(str(error))}', file=out)
+                damaged.append(str(error))
         spent = time.perf_counter() - begun
-        for warning in recording.warnings[told:]:
-            print(f'warning: {escaped(warning)}', file=out)
-        rate = len(recording) / spent if spent else 0.0
-        print(
-            f'checked       {len(recording)} frames, {damaged} damaged, {rate:.0f} frames/s',
-            file=out,
-        )
-    return 1 if damaged else 0
+        lost = [text for text in recording.warnings[told:] if WITHOUT_DEPTH in text]
+        return {
+            'frames': len(recording),
+            'damaged': damaged + lost,
+            'warnings': [text for text in recording.warnings[told:] if text not in lost],
+            'frames_per_s': len(recording) / spent if spent else 0.0,
+        }
 
 
 def _as_text(info: RecordingInfo) -> str:

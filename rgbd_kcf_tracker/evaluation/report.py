@@ -79,6 +79,11 @@ def write_report(
     _write_failures(folder / 'failures.txt', failures)
     if not measured.results:
         raise DatasetError(_why_nothing(failures))
+    if not any(len(result.counted.said) for result in measured.results):
+        raise DatasetError(
+            'nothing was measured: there is no frame to judge after the first, in which the '
+            'target is given'
+        )
 
     curves = plots.mean_curves(measured)
     long_term, long_curves = score_tables.long_term(measured)

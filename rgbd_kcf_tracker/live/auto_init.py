@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.live.settings import NodeParameters
+from rgbd_kcf_tracker.live.settings import NodeParameters, auto_init_range
 from rgbd_kcf_tracker.metric.people import PersonFinder
 
 PERIOD_NS = 180_000_000
@@ -19,10 +19,13 @@ class AutoInit:
 
     Args:
         settings: the node's parameters ``auto_init_*``.
+
+    Raises:
+        ParameterError: where nobody can be between their distances.
     """
 
     def __init__(self, settings: NodeParameters) -> None:
-        self._finder = PersonFinder(settings.auto_init_near, settings.auto_init_far)
+        self._finder = PersonFinder(*auto_init_range(settings))
         self._looked: int | None = None
 
     def __call__(self, frame: Frame) -> Box | None:

@@ -9,7 +9,7 @@ A message is whatever has the fields of its type; no ROS is needed to make one.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Protocol
@@ -76,7 +76,8 @@ class Publishers(Protocol):
 
 
 SHORTEST_LOOP = 10
-"""Images between two jumps back that make a loop; fewer are a fault of the stamps."""
+"""Images between two jumps back that make a loop; fewer are a fault of the stamps, as of two
+publishers, and nothing begins anew."""
 
 
 def in_picture(track: Track, frame: Frame) -> Track:
@@ -173,6 +174,7 @@ class Processor:
                     track = in_picture(session.process(frame), frame)
                     others = tuple(in_picture(other, frame) for other in session.others)
                     insights = session.insights
+                    self._tell_lens(frame, (track, *others))
                     if self._places is not None:
                         places = self._places.judged(places, session.camera_motion)
                 except Exception as error:  # a bug in a tracker must not leave a pair unanswered
@@ -215,6 +217,15 @@ class Processor:
             except Exception as error:  # likewise
                 self._fault('internal_errors', f'internal error: {type(error).__name__}: {error}')
             self._publishers.publish_extras(answer)
+
+    def _tell_lens(self, frame: Frame, tracks: Iterable[Track]) -> None:
+        """Say why there is no position where everything for one is known."""
+        lens = frame.intrinsics is not None and frame.intrinsics.lens is not None
+        if lens and any(t.box and t.depth is not None and t.position is None for t in tracks):
+            self._fault(
+                'bad_camera_info',
+                'the lens of camera_info cannot be taken out at the target: there is no position',
+            )
 
     def _unseen(self) -> Track:
         """The answer where nothing can be seen: no box, and the target is as it was."""
@@ -290,21 +301,20 @@ class Processor:
 
     def _notice(self, header: Any, moment: Instant) -> None:
         self._steady += 1
-        if moment.jumped:
-            # A bag that loops is no fault: it is said once, and counted.
-            loop = moment.restarted and self._restarts > 0 and self._steady >= SHORTEST_LOOP
-            if not loop:
-                self._fault(
-                    'time_jumps',
-                    'stamps jumped: a looping bag (then this is said once), a camera clock that '
-                    'was set, or two publishers?',
-                )
+        loop = moment.restarted and self._steady >= SHORTEST_LOOP
+        # A bag that loops is no fault: it is said once, and counted.
+        if moment.jumped and not (loop and self._restarts > 0):
+            self._fault(
+                'time_jumps',
+                'stamps jumped: a looping bag (then this is said once), a camera clock that '
+                'was set, or two publishers?',
+            )
         if moment.restarted:
             self._restarts, self._steady = self._restarts + 1, 0
             self._statistics.count('restarts')
             if self._places is not None:
                 self._places.forget()
-            if self.on_restart is not None:
+            if loop and self.on_restart is not None:
                 self.on_restart()
         if self._frame_id is not None and header.frame_id != self._frame_id:
             self._fault(

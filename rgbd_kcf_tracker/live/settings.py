@@ -191,17 +191,28 @@ class NodeParameters(Parameters):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        near, far = self.auto_init_near, self.auto_init_far
-        if near >= far:
-            raise ParameterError(
-                f'parameter auto_init_near is {near:g} and auto_init_far {far:g}: nobody is '
-                'between them: the first must be the smaller'
-            )
         if self.publish_tf != OFF and self.tf_name in ('', self.target_frame, self.fixed_frame):
             raise ParameterError(
                 f"parameter tf_name is {self.tf_name!r}: give the target's frame a name of its "
                 'own, other than target_frame and fixed_frame'
             )
+
+
+def auto_init_range(settings: NodeParameters) -> tuple[float, float]:
+    """Between which distances ``auto_init`` looks.
+
+    Each is set by itself, also by ``ros2 param load``: what is between two of them is no fault yet.
+
+    Raises:
+        ParameterError: where nobody can be between them.
+    """
+    near, far = settings.auto_init_near, settings.auto_init_far
+    if near >= far:
+        raise ParameterError(
+            f'parameter auto_init_near is {near:g} and auto_init_far {far:g}: nobody is '
+            'between them: the first must be the smaller'
+        )
+    return near, far
 
 
 READ_ONLY = frozenset(

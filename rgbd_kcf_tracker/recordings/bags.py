@@ -35,6 +35,7 @@ from rgbd_kcf_tracker.recordings.messages import box_from_polygon
 from rgbd_kcf_tracker.recordings.rawbag import RawBag
 from rgbd_kcf_tracker.recordings.recording import (
     NO_DEPTH,
+    WITHOUT_DEPTH,
     Closing,
     ReadOptions,
     RecordingInfo,
@@ -184,7 +185,7 @@ class BagRecording(Closing):
                 raise ImageError(
                     f'{self.path}, frame {number} of {self.topics.depth}: {error}'
                 ) from None
-            self._warn(f'frame {number} of {self.topics.depth} is read without depth: {error}')
+            self._warn(f'frame {number} of {self.topics.depth} is {WITHOUT_DEPTH}: {error}')
             return None
 
     def _open_cameras(self, rectified: str) -> BagCameras | None:

@@ -21,6 +21,7 @@ from rgbd_kcf_tracker.recordings.images import (
     decode_color_bytes,
     decode_depth_bytes,
 )
+from rgbd_kcf_tracker.recordings.recording import WITHOUT_DEPTH
 from rgbd_kcf_tracker.recordings.refused import RefusedReadings
 from rgbd_kcf_tracker.recordings.textfiles import natural_key
 
@@ -184,5 +185,5 @@ class ImageFrames:
         except ImageError as error:
             if broken is None:
                 raise
-            broken(f'{path}: {error}; the frame is read without depth')
+            broken(f'{path}: {error}; the frame is {WITHOUT_DEPTH}')
             return None

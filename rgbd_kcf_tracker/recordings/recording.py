@@ -23,6 +23,8 @@ MIN_FPS, MAX_FPS = 1e-3, 1e6
 
 NO_DEPTH = 'none'
 """As ``depth_topic``: read colour alone."""
+WITHOUT_DEPTH = 'read without depth'
+"""In the warning of a frame whose depth image is damaged: by it who checks a recording counts."""
 
 
 @dataclass(frozen=True, slots=True)

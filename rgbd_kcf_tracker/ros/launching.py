@@ -7,11 +7,15 @@ from __future__ import annotations
 
 import difflib
 import logging
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ament_index_python.packages import get_package_share_directory
+from ament_index_python.packages import (
+    get_package_share_directory,
+    get_packages_with_prefixes,
+)
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 
@@ -121,6 +125,27 @@ def a_file(values: Mapping[str, str], name: str) -> str:
     if not Path(values[name]).is_file():
         raise ParameterError(f'launch argument {name} is {values[name]!r}: there is no such file')
     return values[name]
+
+
+def need(packages: Sequence[str], otherwise: str) -> None:
+    """See that packages are installed, before anything is started.
+
+    Launch itself would notice when other nodes run already, and end without them.
+
+    Args:
+        packages: by their names in ROS.
+        otherwise: what to do without them.
+
+    Raises:
+        ParameterError: where one is missing.
+    """
+    missing = [name for name in packages if name not in get_packages_with_prefixes()]
+    if missing:
+        start = f'ros-{os.environ.get("ROS_DISTRO", "jazzy")}-'
+        apt = ' '.join(start + name.replace('_', '-') for name in missing)
+        raise ParameterError(
+            f'{" and ".join(missing)} not found: sudo apt install {apt}, or {otherwise}'
+        )
 
 
 def full_name(context: Any, values: Mapping[str, str]) -> str:

@@ -25,7 +25,13 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rgbd_kcf_tracker.errors import ParameterError
-from rgbd_kcf_tracker.live.settings import READ_ONLY, NodeParameters, all_parameters, parse_box
+from rgbd_kcf_tracker.live.settings import (
+    READ_ONLY,
+    NodeParameters,
+    all_parameters,
+    auto_init_range,
+    parse_box,
+)
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, Scalar, checked, describe
 from rgbd_kcf_tracker.variants import VARIANTS
 
@@ -98,7 +104,7 @@ class ParameterServer:
         self._changed = changed
         self._infos = {info.name: info for info in all_parameters()}
         declare_all(node, self._infos, READ_ONLY.__contains__)
-        self.node_parameters()  # each may be right alone, and not beside another
+        auto_init_range(self.node_parameters())  # each may be right alone, and not beside another
         node.add_pre_set_parameters_callback(self._before_set)
         node.add_on_set_parameters_callback(self._on_set)
         node.add_post_set_parameters_callback(self._after_set)

@@ -97,7 +97,10 @@ class ReplayNode(Node):
                     f'lockstep needs an answer_topic and a colour topic in {parameters.bag}'
                 )
             self._await_subscribers(source, stop)
-            self._play(source, answers, stop)
+            if stop.is_set():
+                self.get_logger().info('stopped before anything was sent')
+            else:
+                self._play(source, answers, stop)
 
     def _advertise(self, source: ReplaySource) -> None:
         parameters = self.parameters

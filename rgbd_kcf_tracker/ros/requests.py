@@ -90,8 +90,10 @@ class Requests:
 
     def reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """``~/reset``: drop the target."""
+        dropped = self._session.following
         self._in_worker('reset', self._session.reset)
-        response.success, response.message = True, 'target dropped'
+        response.message = 'target dropped' if dropped else 'there was no target'
+        response.success = True
         return response
 
     def from_parameters(self, names: frozenset[str]) -> None:
@@ -106,7 +108,10 @@ class Requests:
             if settings.auto_init:
                 from rgbd_kcf_tracker.live.auto_init import AutoInit
 
-                auto = AutoInit(settings)
+                try:
+                    auto = AutoInit(settings)
+                except RgbdKcfError as error:
+                    self._fault(REJECTED, f'auto_init: {error}')
             again = settings.auto_init_again
             self._in_worker('auto_init', lambda: self._session.choose_by_itself(auto, again))
 

@@ -44,8 +44,7 @@ class Subscriptions:
         color, depth, camera_info, init, init_point, add, remove: called with each message.
 
     Raises:
-        ParameterError: where colour and depth would be one topic, or a depth of ``qos_overrides``
-            cannot be.
+        ParameterError: where colour and depth would be one topic, or an override of QoS cannot be.
     """
 
     def __init__(
@@ -74,8 +73,7 @@ class Subscriptions:
                 f'{COLOR} and {DEPTH} are both {one}: remap each to a topic of its own'
             )
         overriding = QoSOverridingOptions.with_default_policies()
-        policies = [kind.name.lower() for kind in overriding.policy_kinds]
-        _check_overrides(node, (one, other, node.resolve_topic_name(CAMERA_INFO)), policies)
+        _check_overrides(node, (one, other, node.resolve_topic_name(CAMERA_INFO)))
         try:
             for topic, callback in ((COLOR, color), (DEPTH, depth)):
                 self._all[topic] = node.create_subscription(
@@ -142,18 +140,26 @@ class Subscriptions:
         self._all.clear()
 
 
-def _check_overrides(node: Node, topics: Iterable[str], policies: Iterable[str]) -> None:
-    """Warn of overrides that nobody reads, and refuse a depth of which rclpy says little."""
-    prefix = 'qos_overrides'
-    known = [f'{prefix}.{topic}.subscription.{policy}' for topic in topics for policy in policies]
+def _check_overrides(node: Node, topics: Iterable[str]) -> None:
+    """Warn of overrides that nobody reads, and refuse what rclpy refuses without naming it."""
     depth = next(info for info in describe(NodeParameters) if info.name == 'qos_depth')
+    policies = {'depth': depth}
+    for policy, kind in (('history', HistoryPolicy), ('reliability', ReliabilityPolicy)):
+        words = tuple(word for word in kind.short_keys() if word != 'unknown')
+        policies[policy] = replace(depth, type=str, minimum=None, maximum=None, choices=words)
+    prefix = 'qos_overrides'
+    known = {
+        name: replace(info, name=name)
+        for topic in topics
+        for policy, info in policies.items()
+        for name in (f'{prefix}.{topic}.subscription.{policy}',)
+    }
     for rest in node.get_parameters_by_prefix(prefix):
         name = f'{prefix}.{rest}'
-        if name not in known:
-            if not rest.startswith(ROS_TOPICS):
-                node.get_logger().warning(unknown(name, known))
-        elif name.endswith('.depth'):
-            coerced(replace(depth, name=name), node.get_parameter(name).value)
+        if name in known:
+            coerced(known[name], node.get_parameter(name).value)
+        elif not rest.startswith(ROS_TOPICS):
+            node.get_logger().warning(unknown(name, known))
 
 
 def image_qos(settings: NodeParameters) -> QoSProfile:

@@ -49,6 +49,14 @@ from rgbd_kcf_tracker.variants import VARIANTS
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 POLL_PERIOD_S = 0.025
 DIAGNOSTICS_PERIOD_S = 1.0
+SOURCES = {
+    'bad_color': COLOR,
+    'bad_depth': DEPTH,
+    'empty_depth': DEPTH,
+    'odd_depth': DEPTH,
+    'bad_camera_info': CAMERA_INFO,
+}
+"""The inputs of which faults of these kinds are."""
 MOST_WORDS = 500
 """Characters that are said of a fault."""
 LOG_PERIOD_S = 5.0
@@ -83,6 +91,7 @@ class TrackerNode(LifecycleNode):
         self._reset_service: Any = None
         self._refusals = Allowance(MOST_REFUSALS, REFUSALS_A_SECOND)
         self._logged: dict[str, float] = {}
+        self._topics: dict[str, str] = {}
         self._unheard: set[str] = set()
         self._unheard_told: set[str] = set()
         try:
@@ -224,6 +233,8 @@ class TrackerNode(LifecycleNode):
             self._cannot(f'cannot activate: {_first_line(error)}')
             self._stop_listening()
             return FAILURE
+        # Known to the worker, too, which may have an image in work when the inputs have gone.
+        self._topics = {kind: self._inputs.topic(name) for kind, name in SOURCES.items()}
         self.statistics.listening()
         self.get_logger().info(f'variant {settings.variant} listens to {self._inputs.describe()}')
         return super().on_activate(state)
@@ -361,6 +372,8 @@ class TrackerNode(LifecycleNode):
 
     def _fault(self, kind: str, text: str) -> None:
         """Count a fault and say it, each kind every few seconds at most; refusals always."""
+        if kind in self._topics:
+            text = f'{self._topics[kind]}: {text}'
         if len(text) > MOST_WORDS:  # an encoding or a model in a message may be of any length
             text = f'{text[:MOST_WORDS]} ...'
         if kind == REJECTED:

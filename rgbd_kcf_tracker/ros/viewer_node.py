@@ -11,6 +11,7 @@ neither waits for it nor knows of it.
 from __future__ import annotations
 
 import queue
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -90,7 +91,8 @@ class ViewerNode(Node):
         # Its full name, as diagnostics and messages to people have it.
         self._tracker = self.resolve_topic_name(f'{tracker}/state').removesuffix('/state')
         self.page = LivePage(self._tracker.lstrip('/'), self.settings.rate)
-        self.create_subscription(DiagnosticArray, f'{tracker}/state', self._on_state, LIGHT)
+        told: Any = self._on_state  # what DDS says of a message is not in rclpy's types
+        self.create_subscription(DiagnosticArray, f'{tracker}/state', told, LIGHT)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
         self._init = self.create_publisher(RegionOfInterest, f'{tracker}/init', 10)
         self._add = self.create_publisher(RegionOfInterest, f'{tracker}/add', 10)
@@ -104,13 +106,19 @@ class ViewerNode(Node):
         self._alone: dict[int, Any] = {}
         self._camera: Camera | None = None
         self._unwatched = 0.0
+        self._number = 0  # of the last answer, as its publisher counts
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._poll, clock=steady)
         self.create_timer(SETTINGS_S, self._ask_settings, clock=steady)
 
     # -- what comes -------------------------------------------------------------------------------
 
-    def _on_state(self, message: DiagnosticArray) -> None:
+    def _on_state(self, message: DiagnosticArray, info: Mapping[str, Any]) -> None:
+        # Who is configured anew publishes anew, within less time than diagnostics take to tell.
+        number = info['publication_sequence_number'] or 0  # None where DDS tells none
+        if 0 < number <= self._number:
+            self.page.begin_anew()
+        self._number = number
         with suppress(RgbdKcfError):  # of somebody else's
             self.page.answer(stamp_of(message), tracks_of_state(message))
         self._show_what_is_due()

@@ -210,6 +210,14 @@ class LivePage:
             while len(self._names) > _MOST_NAMES:
                 self._names.popitem(last=False)
 
+    def begin_anew(self) -> None:
+        """The tracker was started anew: its ids begin again, and are of others."""
+        self._names.clear()
+        self._looks.clear()
+        self._answers.clear()
+        self._pending = self._early = None
+        self._origin_ns, self._timeline = None, Timeline()
+
     def box_of(self, number: int) -> Box:
         """Where a target was in the last answer.
 

@@ -443,13 +443,13 @@ def _bound(host: str, port: int) -> socket.socket:
         listening.bind((host, port))
     except (UnicodeError, socket.gaierror):
         raise ParameterError(
-            f'{host!r} is no name or address of this machine: give another as --host'
+            f'{host!r} is no name or address of this machine: give another host'
         ) from None
     except (OSError, OverflowError) as error:
         reason = getattr(error, 'strerror', None) or error
         wrong = 'host' if getattr(error, 'errno', None) == errno.EADDRNOTAVAIL else 'port'
         raise ParameterError(
-            f'{host}:{port} cannot be listened on: {reason}; name another --{wrong}'
+            f'{host}:{port} cannot be listened on: {reason}; name another {wrong}'
         ) from None
     return listening
 
