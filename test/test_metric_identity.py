@@ -267,6 +267,15 @@ def test_views_without_common_parts_say_nothing():
     assert gallery._most_redundant() == 3, 'it says the same as the next'
 
 
+def test_many_views_are_compared_as_each_is_alone():
+    rng = np.random.default_rng(0)
+    paints = rng.integers(20, 220, (2, 90, 3)).tolist()
+    views = [look(tuple(a), tuple(b)) for a, b in zip(*paints, strict=True)]
+    together = Compared.of(views[0], Looks.of(views)).alike
+    alone = [Compared.of(views[0], Looks.of([each])).alike[0] for each in views]
+    np.testing.assert_allclose(together, alone, atol=1e-6)
+
+
 def test_log_odds_of_a_look_rise_with_likeness_and_are_bounded():
     odds = [look_log_odds(a, 1.0, 5) for a in np.linspace(0, 1, 21)]
     assert odds == sorted(odds)
@@ -1509,6 +1518,21 @@ def test_two_who_were_taken_for_one_another_go_on_as_each_other_with_what_was_le
         assert len(person.gallery.views) == 2
         assert person.gallery.log_odds(look(others, BLUE)) < 0
         assert person.gallery.log_odds(look(shirt, BLUE)) > 0
+
+
+def test_who_came_beside_one_who_had_his_number_can_be_given_it_back():
+    """He had been seen beside his own number, and so was somebody else for good."""
+    crowd = Crowd()
+    taken, beside, newcomer, before = (crowd.welcome(np.zeros(2), t) for t in (0.0, 0.0, 5.0, 0.0))
+    for each in (beside, newcomer):
+        each.meet(taken)
+    before.meet(newcomer)
+    crowd._exchange(taken, None, 4.0)
+    stranger = crowd.people[-1]
+    assert stranger.met == {newcomer.number}
+    assert newcomer.met == {stranger.number, before.number}
+    assert taken.met == {beside.number}
+    assert beside.met == {taken.number}
 
 
 def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():

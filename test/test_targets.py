@@ -865,6 +865,98 @@ def test_where_depth_ends_is_known_although_an_image_was_empty(empty: int):
     assert (rim.left, rim.right) == (40, 40)
 
 
+@pytest.mark.parametrize('away', [1, 3])
+def test_depth_without_a_single_reading_for_a_moment_is_as_none(away: int):
+    """The room began anew with the next image, and who stood there was a part of it."""
+    boxes, rooms = [], []
+    for blank in (True, False):
+        targets = TargetSet('metric')
+        targets.everyone = True
+        shown = []
+        for i in range(40):
+            frame = picture([left(min(i, 20)), right(i)] if i > 3 else [], STEP * i)
+            if 25 <= i < 25 + away:
+                depth = np.full_like(frame.depth, np.nan) if blank else None
+                # So much changes in the picture that the camera may have moved.
+                noise = np.random.default_rng(i).integers(0, 40, frame.color.shape, np.uint8)
+                frame = dataclasses.replace(frame, color=frame.color // 2 + noise, depth=depth)
+            shown.append({n: track.box for n, track in targets.update(frame).items()})
+        boxes.append(shown)
+        assert targets.metric is not None
+        rooms.append(targets.metric._reader.room.depth)
+    np.testing.assert_array_equal(*rooms)
+    assert boxes[0] == boxes[1]
+    assert all(box is not None for box in boxes[0][-1].values())
+    assert len(boxes[0][-1]) == 2
+
+
+def test_who_is_chosen_in_an_image_without_depth_is_he_who_was_followed_with_everyone():
+    """He got another id, and as somebody who had been there before he was refused by it."""
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for i in range(20):
+        tracks = targets.update(picture([left(i), right(i)] if i > 3 else [], STEP * i))
+    (his,) = (n for n, track in tracks.items() if track.box.iou(left(19).box) > 0.5)
+    frame = without_depth(20)
+    targets.update(frame)
+    number = targets.add(frame, left(20).box)
+    assert number == his
+    for i in range(21, 30):
+        tracks = targets.update(both(i))
+        assert tracks[number].box.iou(left(i).box) > 0.5
+        assert len(tracks) == 2
+    # After a while it is not known any more who stood there.
+    for i in range(30, 40):
+        targets.update(without_depth(i))
+    targets.remove(number)
+    assert targets.add(without_depth(40), left(40).box) != his
+
+
+def test_the_feet_of_who_is_near_are_not_below_the_image():
+    targets = TargetSet('metric')
+    targets.everyone = True
+    height, low = 270, 0
+    for one in islice(simulate('group_crossing', seed=1, rate_hz=5.0, size=(480, height)), 40):
+        for track in targets.update(one.frame).values():
+            if track.box is not None:
+                assert track.box.bottom <= height
+                low += track.box.bottom > height - 1
+    assert low > 5
+
+
+def test_two_of_whom_only_looks_are_known_are_not_both_the_one_who_comes_in():
+    """Both went over to him in one frame, and neither had a box from then on."""
+    targets, one, other = TargetSet('metric'), Someone(-0.35, 2.5), Someone(0.35, 2.5)
+    frame = picture([one, other], 0.0, unread=one)
+    first, second = (targets.add(frame, each.box) for each in (one, other))
+    for i in range(1, 10):
+        targets.update(picture([one, other], STEP * i, unread=one))
+    for i in range(10, 16):
+        targets.update(picture([], STEP * i))
+    for i in range(16, 40):
+        comes = Someone(0.03 * min(i - 16, 15), 2.5)
+        tracks = targets.update(picture([comes], STEP * i))
+        boxes = [tracks[n].box for n in (first, second)]
+        assert boxes[0] is not None, i
+        assert boxes[0].iou(comes.box) > 0.8
+        assert boxes[1] is None or boxes[1].iou(boxes[0]) < 0.6
+    assert boxes[1] is None
+
+
+def test_targets_that_were_removed_are_forgotten_as_others_are():
+    targets = TargetSet('metric')
+    for i in range(MOST_PEOPLE + 20):
+        frame = picture([Someone(-0.8 + 0.02 * (i % 80), 3.0)], STEP * i)
+        targets.update(frame)
+        assert targets.metric is not None
+        crowd = targets.metric._crowd
+        crowd.welcome(np.array([0.1 * i, 9.0]), crowd.time, chosen=True)
+    for person in crowd.people:
+        person.chosen = False
+    crowd.welcome(np.zeros(2), crowd.time)
+    assert len(crowd.people) == MOST_PEOPLE
+
+
 def test_who_comes_while_as_many_are_remembered_as_can_be_is_not_forgotten_at_once():
     """Two who came together above a counter forgot each other in every frame."""
     shown = []

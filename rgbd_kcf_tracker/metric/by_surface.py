@@ -72,8 +72,6 @@ smaller part has not all of its colours."""
 STANDING = 0.5
 """Share of a candidate that is somebody else's, or stood there while the target was elsewhere, from
 which it is not the target: the greater part of it, for everybody touches something or somebody."""
-SOMEBODY_ELSE = 3.0
-"""Log-odds (20 to 1) by which somebody else explains a candidate better, from which it is his."""
 APART = 0.5
 """Distance between two candidates, in widths of the body, from which they are not parts of one.
 Two who stand side by side are a width apart, and halves of one body half a width."""
@@ -182,7 +180,7 @@ class BySurface:
         self.candidates = [
             c
             for c in self._weighed(account, frame, free, dt, missing)
-            if c.evidence.room < STANDING and c.evidence.behind < SOMEBODY_ELSE
+            if c.evidence.room < STANDING
         ]
         self.candidates.sort(key=lambda c: -c.probability)
         if not self.candidates:

@@ -30,6 +30,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, p
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP
 
 LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
@@ -272,7 +273,13 @@ class GatedLook:
             return False
         owner = account.people[account.owner[index]]
         before = owner.first_seen <= self._since and owner.number not in self._people
-        return before or (drawn is not None and owner.number in self._newcomers.beside)
+        beside = owner.chosen or owner.number in self._newcomers.beside
+        return before or (drawn is not None and beside)
+
+    def _of_another(self, account: Account, whole: Silhouette) -> bool:
+        """Whether a figure is another target."""
+        index = account.sight_of(whole)
+        return index >= 0 and (row := account.owner[index]) >= 0 and account.people[row].chosen
 
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.
@@ -307,6 +314,8 @@ class GatedLook:
             self._agreed = 0
             return None
         whole = whole_of(account, look.box)
+        if whole is not None and self._of_another(account, whole):
+            whole = None
         if whole is not None and box_about(account.scene, whole).iou(look.box) > SAME_OUTLINE:
             self._agreed += 1
             if self._agreed >= RELOCK_FRAMES:

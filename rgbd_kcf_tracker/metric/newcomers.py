@@ -97,6 +97,8 @@ class Newcomers:
             if row >= len(account.looks):
                 continue
             person = account.people[row] if row >= 0 else None
+            if person is not None and person.chosen:  # another target
+                continue
             met = person is not None and (
                 person.first_seen <= self._since or person.number in self.beside
             )

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.metric.by_surface import Candidate
-from rgbd_kcf_tracker.metric.decide.account import Account
+from rgbd_kcf_tracker.metric.decide.account import RECENT, Account
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
@@ -86,6 +86,7 @@ class MetricTargets:
         self.embedding = _network_of(parameters) if embedding is None else embedding
         self.everyone = self.puts_off = self._unlearned = False
         self.account: Account | None = None
+        self._last_account: Account | None = None
         self._reader, self._crowd = self._new_memory(first)
         self._followers: dict[int, Follower] = {}
         self._waiting: list[int] = []
@@ -218,13 +219,22 @@ class MetricTargets:
 
     def _follower(self, frame: Frame, box: Box) -> Follower:
         """Whoever is in a box of the frame that was perceived."""
-        follower = Follower(frame, self.account, self._crowd, box, self._parameters, self._cues)
-        if self.account is not None and follower.seen is not None:
+        account = self._lately
+        follower = Follower(frame, account, self._crowd, box, self._parameters, self._cues)
+        if account is not None and follower.seen is not None:
             # Whoever stood there from the first frame on was taken for a part of the room.
             self._reader.is_somebody(follower.seen)
             if follower.person is not None:
-                follower.person.figure |= makes_figure(self.account.scene, follower.seen)
+                follower.person.figure |= makes_figure(account.scene, follower.seen)
         return follower
+
+    @property
+    def _lately(self) -> Account | None:
+        """The account of the last frame, or of the one before that if only that one had depth."""
+        before = self._last_account
+        if self.account is None and before is not None and self._time - before.time < RECENT:
+            return before
+        return self.account
 
     def _in_other_metres(self, frame: Frame) -> bool:
         """Whether the camera turns out to be another than was taken so far, and all are seen.
@@ -295,6 +305,7 @@ class MetricTargets:
         size = frame.width, frame.height
         if size != self._size:
             self._size, self._camera, self._metres = size, None, None
+            self._last_account = None
         self._camera = frame.intrinsics or self._camera
         if frame.intrinsics is None and self._camera is not None:
             # A guess would put the room and everybody elsewhere.
@@ -307,6 +318,7 @@ class MetricTargets:
             self._describer.frame = frame
         if scene is not None:
             self.account = self._crowd.explain(scene, self._time, self._reader.is_somebody)
+            self._last_account = self.account
         return dt
 
     def _turns(self, dt: float) -> list[int]:

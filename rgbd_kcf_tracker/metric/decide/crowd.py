@@ -102,11 +102,9 @@ class Crowd:
     def welcome(self, place: FloatArray, time: float, chosen: bool = False) -> Person:
         """Somebody new at ``place``, ``(2,)`` metres."""
         others = [p for p in self.people if not p.chosen]
-        if len(others) >= MOST_PEOPLE:
-            # Who has just come may not have shown yet that he is somebody.
-            forgotten = min(
-                others, key=lambda p: (self.time - p.seen_at < RECENT, p.alive, p.seen_at)
-            )
+        # Who has just come may not have shown yet that he is somebody.
+        others.sort(key=lambda p: (self.time - p.seen_at < RECENT, p.alive, p.seen_at))
+        for forgotten in others[: max(len(others) - MOST_PEOPLE + 1, 0)]:
             if forgotten.alive:
                 self._arrivals.forgotten += is_new(forgotten.again, self._arrivals.last)
             self.forget(forgotten)
@@ -241,17 +239,25 @@ class Crowd:
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
-            other = mixed_up.second
-            if other is None:
-                other = self.welcome(mixed_up.first.place, mixed_up.since)
-            mixed_up.first.exchange(other, mixed_up.since)
-            for person in (mixed_up.first, other):
-                self._comebacks.drop(person)
+            self._exchange(mixed_up.first, mixed_up.second, mixed_up.since)
             account, _ = self._explained(scene, sights, time)
         for column, row in enumerate(account.owner):
             if row >= 0:
                 self._compare(account, row, column)
         return account
+
+    def _exchange(self, person: Person, other: Person | None, since: float) -> None:
+        """Who has somebody's number since ``since`` is another, or None for somebody new."""
+        if other is None:
+            other = self.welcome(person.place, since)
+        person.exchange(other, since)
+        for each in self.people:  # who came after that was seen beside the other alone
+            if each.first_seen >= since and each.number in person.met:
+                each.met.discard(person.number)
+                person.met.discard(each.number)
+                each.meet(other)
+        self._comebacks.drop(person)
+        self._comebacks.drop(other)
 
     def _sights(self, scene: Scene, figures: list[Figure], time: float) -> list[Sight]:
         """The look of each figure, described where there is a network."""

@@ -60,14 +60,14 @@ def _at_rim(scene: Scene, seen: Silhouette) -> tuple[bool, bool]:
 
 
 def _foot(scene: Scene, seen: Silhouette) -> float:
-    """Row of the view in which a silhouette ends, feet included."""
+    """Row of the view in which a silhouette ends, feet included, as far as the view goes."""
     rows, cols = seen.mask.shape
     bottom = float(seen.top + rows)
     if scene.floor is not None and not seen.cut.bottom:
         foot = scene.floor.row_at(seen.left + cols / 2, seen.depth)
         missing = (foot - bottom) * seen.depth / scene.view.intrinsics.fy
         if 0 < missing < min(FOOT, FOOT_SHARE * seen.height):
-            return foot
+            return min(foot, float(scene.view.shape[0]))
     return bottom
 
 

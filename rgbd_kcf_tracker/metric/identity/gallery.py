@@ -39,6 +39,9 @@ DIMMER = (0, 1, -1, 2, -2)
 DIMMER_COST = 0.01
 """Shifts of lightness, in levels, at which two views are compared, and what each level costs:
 little, so that it only says which of two is more alike that are alike but for their light."""
+MOST_ROWS = 640
+"""Rows of views that are multiplied at once: of more, OpenBLAS shares a product out to threads, and
+on a busy computer these wait for each other far longer than the product takes."""
 LEAST_SLICE = 0.004
 """Square metres of a slice from which its colours are compared: a patch of some 6 cm; less is
 mostly rim."""
@@ -264,8 +267,11 @@ class Compared:
         weight = np.sqrt(common) * (_SLICE_WEIGHT * view.color) * looks.color
         weight[common < LEAST_SLICE] = 0
         # All levels of one against all of the other; the shifts are the diagonals of that.
-        cross = (looks.roots @ view.roots.transpose(0, 2, 1)).reshape(SLICES, len(looks), -1)
-        alike = (cross @ _DIAGONALS).transpose(1, 0, 2)
+        cross = np.empty((SLICES, len(looks) * LIGHTNESS, LIGHTNESS), np.float32)
+        for first in range(0, cross.shape[1], MOST_ROWS):
+            rows = np.s_[:, first : first + MOST_ROWS]
+            np.matmul(looks.roots[rows], view.roots.transpose(0, 2, 1), out=cross[rows])
+        alike = (cross.reshape(SLICES, len(looks), -1) @ _DIAGONALS).transpose(1, 0, 2)
         np.minimum(alike, looks.most[:, None, None], out=alike)
         return cls(weight, alike, _network(view, looks))
 

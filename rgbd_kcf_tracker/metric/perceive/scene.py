@@ -172,7 +172,8 @@ class SceneReader:
         self.seems = None
         self._unread += seconds
         view = DepthView.of(frame, self._width)
-        if view is None:
+        # Where the room was read and now nothing is, the camera has failed for a moment.
+        if view is None or (not view.depth.any() and self.room.depth.any()):
             return None
         # To what depth shows the frames without it are a pause.
         seconds, self._unread = self._unread, 0.0
