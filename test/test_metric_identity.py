@@ -1326,6 +1326,26 @@ def test_who_comes_back_is_not_taken_for_one_who_was_seen_beside_him():
 
 
 @pytest.mark.parametrize('sure', [True, False])
+def test_the_body_is_learned_only_of_who_is_surely_the_target(
+    sure: bool, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(follower, 'LEARNED', 0.6 if sure else 1.1)
+    targets, number, _ = followed()
+    surface = targets._followers[number]._surface
+    assert surface is not None
+    x, known = float(surface.motion.position[0]), surface.body.area
+    for i in range(8):
+        one = Someone(x + 0.02 * i, 3.0)
+        frame = picture([one], 1.3 + 0.1 * i)
+        bag = np.s_[int(one.box.cy) : int(one.box.cy) + 40, int(one.box.x) - 12 : int(one.box.cx)]
+        frame.color[bag], frame.depth[bag] = RED, 3.0
+        track = targets.update(frame)[number]
+        assert track.box is not None
+    assert (surface.body.area > 1.02 * known) == sure
+    assert surface.motion.position[0] - x > 0.03, 'where he is is told all the same'
+
+
+@pytest.mark.parametrize('sure', [True, False])
 def test_nothing_but_the_place_is_learned_of_who_may_be_somebody_else(sure: bool):
     watched = Watched()
     one = watched.walk(-1.0, 0.0, 3.0, RED)

@@ -244,8 +244,13 @@ class BySurface:
         """Who was followed is somebody else: the target has been away for ``gone`` seconds."""
         self.hidden_for, self._misses = gone, MISSES
 
-    def take(self, scene: Scene, found: Candidate) -> Box:
+    def take(self, scene: Scene, found: Candidate, sure: bool) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
+
+        Args:
+            scene: of the frame.
+            found: what was found.
+            sure: whether it is surely the target: else nothing but its place is learned.
 
         Returns:
             The box of its visible part in pixels of the image.
@@ -256,10 +261,11 @@ class BySurface:
         self.motion.correct(placed.position, placed.sigma)
         if not seen.cut.any:
             self._stood.seen(placed.position, placed.sigma, self._dt)
-        self.body.grow(seen)
+        if sure:
+            self.body.grow(seen)
         self._middle.seen(scene.view, seen, placed, self.body)
         since = scene.since
-        if since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
+        if sure and since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
             self.body.learn_colors(seen, scene.codes, scene.view, top, since)
             self._learn_around(scene, seen, since)
