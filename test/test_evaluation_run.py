@@ -142,6 +142,13 @@ def test_thumbnails_stay_few_and_evenly_spread():
     assert len(set(np.diff(indices))) == 1
 
 
+@pytest.mark.parametrize('shape', [(1, 1700), (1700, 1)])
+def test_a_picture_of_any_shape_has_a_thumbnail(shape: tuple[int, int]):
+    thumbnails = Thumbnails()
+    thumbnails.feed(Sample(Frame(np.zeros((*shape, 3), np.uint8), None, 0), None))
+    assert list(thumbnails.pictures) == [0]
+
+
 def test_a_run_leaves_tracks_and_is_not_made_twice(tmp_path: Path):
     sequences, calls = [sequence('a'), sequence('b', seed=5)], []
     options = RunOptions()

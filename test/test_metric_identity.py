@@ -57,6 +57,7 @@ from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import BORNE_OUT, EVEN, Comeback
+from rgbd_kcf_tracker.metric.identity.embedding import Described
 from rgbd_kcf_tracker.metric.identity.gallery import (
     ALL_SIDES,
     MOST_VIEWS,
@@ -68,6 +69,7 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     Gallery,
     Looks,
     View,
+    _Learned,
     height_log_odds,
     look_log_odds,
     same_person,
@@ -259,12 +261,11 @@ def test_views_without_common_parts_say_nothing():
         assert before is not None
         assert (before == 0.0) if other is empty else (before > 1)
     gallery = Gallery()
-    for time, each in enumerate([look(GREY), head, legs, look(BLUE)]):
-        gallery.learn(each, time)
-    gallery.doubt(3.0, -1.0)
-    gallery.learn(look(BLUE), 4.0)
-    assert len(gallery.views) == 5, 'a doubtful view leaves room for a sure one'
+    views = [look(GREY), head, legs, look(BLUE), look(BLUE)]
+    gallery._set_learned([_Learned(each, 0.0) for each in views])
     assert gallery._most_redundant() == 3, 'it says the same as the next'
+    gallery._set_learned([_Learned(each, n, -1.0 * (n == 1)) for n, each in enumerate(views)])
+    assert gallery._most_redundant() == 1, 'it is the least trusted'
 
 
 def test_many_views_are_compared_as_each_is_alone():
@@ -409,6 +410,54 @@ def test_who_is_like_a_doubtful_view_is_no_surer_the_person_than_the_view_is():
     gallery.doubt(2.0, 3.0)
     assert gallery.log_odds(stranger) == told, 'a doubt stays'
     assert gallery.copy().log_odds(stranger) == told
+    # Nor does another become surer by it; but as soon as he is seen so surely, it counts.
+    he = Gallery()
+    he.take(gallery)
+    assert he.log_odds(stranger) == pytest.approx(told, abs=0.05)
+    views = len(gallery.views)
+    gallery.learn(look(BLACK, GREY), 3.0)
+    assert len(gallery.views) == views
+    assert gallery.log_odds(stranger) > 2.5
+    # A network tells it as little.
+    vector = np.array([1.0, 0.0], np.float32)
+    described = dataclasses.replace(stranger, described=Described(vector, 0.5, 10.0))
+    known = Looks.of([described], [-2.0])
+    assert Compared.of(described, known).network[0] == -2
+    assert look_log_odds(*known_by(described, known)) < -2
+
+
+def known_by(view: View, known: Looks) -> tuple[float, float, int, bool, float]:
+    """The arguments of ``look_log_odds`` for a view and those of somebody."""
+    alike, network = Compared.of(view, known).of_each([0])[0].tolist()
+    return alike, view.total, len(known), view.grey, network
+
+
+def test_the_views_of_a_return_take_the_place_of_none_that_was_known_before():
+    """Sixty views of a stranger left one of ten."""
+    rng = np.random.default_rng(3)
+    paints = rng.integers(20, 230, (2, 40, 3)).tolist()
+    looks = [look(tuple(a), tuple(b)) for a, b in zip(*paints, strict=True)]
+    crowd = Crowd()
+    person = crowd.welcome(np.zeros(2), 0.0, chosen=True)
+    for time, view in enumerate(looks[:8]):
+        person.gallery.learn(view, 0.1 * time)
+    known = list(person.gallery.views)
+    assert len(known) > 4
+    comeback = Comeback(person, 10.0, 0.0)
+    for time, view in enumerate(looks[8:]):
+        person.gallery.learn(view, 10.0 + 0.1 * time)
+    comeback.hear(look(GREEN), {}, 0.0, 20.0)
+    comeback.settle(person)
+    doubted = len(person.gallery.views)
+    for _ in range(20):  # the same once more
+        person.gallery.learn(person.gallery.views[-1], 21.0)
+    assert len(person.gallery.views) == doubted
+    person.gallery.restore(comeback.known)
+    assert all(view in person.gallery.views for view in known)
+    assert len(person.gallery.views) <= MOST_VIEWS
+    crowd.disown(person, comeback)
+    assert person.gallery.views == known
+    assert all(each.trust == math.inf for each in crowd.people[-1].gallery._learned)
 
 
 # -- one person -----------------------------------------------------------------------------------

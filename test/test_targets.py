@@ -890,6 +890,23 @@ def test_depth_without_a_single_reading_for_a_moment_is_as_none(away: int):
     assert len(boxes[0][-1]) == 2
 
 
+@pytest.mark.parametrize('reading', [None, 0.0, np.nan])
+def test_a_target_is_found_in_images_of_another_size_whose_depth_reads_nothing(reading):
+    """It was sought in the pixels of the old size."""
+    targets = TargetSet('metric')
+    for i in range(12):
+        targets.update(picture([left(i)] if i > 3 else [], STEP * i))
+        if i == 6:
+            number = targets.add(picture([left(i)], STEP * i), left(i).box)
+    for i in range(12, 18):
+        frame = larger(picture([left(i)], STEP * i), 2, reading is not None)
+        if reading is not None:
+            frame.depth[:] = reading
+        box = targets.update(frame)[number].box
+        assert box is not None
+        assert box.iou(left(i).box.stretched(2, 2)) > 0.5
+
+
 def test_who_is_chosen_in_an_image_without_depth_is_he_who_was_followed_with_everyone():
     """He got another id, and as somebody who had been there before he was refused by it."""
     targets = TargetSet('metric')

@@ -448,6 +448,16 @@ def test_the_box_keeps_its_colour_in_small_videos(size: tuple[int, int], tmp_pat
     assert sum(value > 80 for value in green) >= 2, line
 
 
+@pytest.mark.parametrize('shape', [(40, 1), (1, 1700)])
+def test_pictures_of_any_shape_become_a_video(shape: tuple[int, int], tmp_path: Path) -> None:
+    """One pixel wide, it was enlarged to more rows than H.264 has."""
+    frame = Frame(np.zeros((*shape, 3), np.uint8), None, 0)
+    with VideoWriter(tmp_path / 'a.mp4') as writer:
+        for _ in range(3):
+            writer.write_track(frame, Track(Box(0, 0, 1, 1), TrackState.TRACKING, 0.9), None)
+    assert len(frames_of(tmp_path / 'a.mp4')) == 3
+
+
 WRITE_VIDEO = """
 import sys
 import numpy as np

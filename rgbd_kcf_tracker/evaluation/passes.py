@@ -214,7 +214,7 @@ class Thumbnails:
         frame = sample.frame
         if self._index % self._step == 0:
             self.scale = min(1.0, THUMBNAIL_WIDTH / frame.width)
-            size = (round(frame.width * self.scale), round(frame.height * self.scale))
+            size = [max(1, round(side * self.scale)) for side in (frame.width, frame.height)]
             small: npt.NDArray[np.uint8] = np.asarray(
                 cv2.resize(frame.color, size, interpolation=cv2.INTER_AREA), np.uint8
             )

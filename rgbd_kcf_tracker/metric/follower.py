@@ -383,6 +383,8 @@ class Follower:
         """The target has gone again: say what was learned since it came back."""
         if self._comeback is not None:
             self._comeback.settle(person)
+            person.gallery.restore(self._comeback.known)
+            person.gallery.trust = math.inf
             if not self._comeback.borne_out:
                 self._crowd.unmeet(person, self._comeback)
         self._comeback = None

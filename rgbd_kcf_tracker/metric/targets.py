@@ -169,7 +169,7 @@ class MetricTargets:
         dt = self._perceive(frame)
         turns = self._turns(dt)
         view = self._reader.last_view
-        if view is not None and frame.depth is None:  # or the image may have another size by now
+        if view is not None and self.account is None:  # the image may have another size by now
             view = view.at(frame, self._parameters.view_width)
         tracks = {
             number: dataclasses.replace(

@@ -37,7 +37,7 @@ from rgbd_kcf_tracker.track import Track
 
 SUFFIXES = ('.mp4', '.m4v', '.mov', '.mkv')
 
-_SMALLEST_WIDTH = 640
+_SMALLEST_WIDTH, _LARGEST_HEIGHT = 640, 4096
 _QUIET = ['-hide_banner', '-loglevel', 'error', '-y']
 # In pieces of a second, each complete in itself: a full disk or a kill loses the last one alone.
 _IN_PIECES = ['-movflags', '+empty_moov+default_base_moof', '-frag_duration', '1000000']
@@ -208,7 +208,8 @@ def _ffmpeg(path: Path) -> str:
 
 def _enlarged(frame: Frame) -> tuple[npt.NDArray[np.uint8], int]:
     """The picture, and by how much it is enlarged: words and lines want more than a small one."""
-    factor = max(1, math.ceil(_SMALLEST_WIDTH / frame.width))
+    factor = min(math.ceil(_SMALLEST_WIDTH / frame.width), _LARGEST_HEIGHT // frame.height)
+    factor = max(1, factor)
     if factor == 1:
         return frame.color, 1
     return cast(

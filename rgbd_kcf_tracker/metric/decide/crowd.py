@@ -428,6 +428,7 @@ class Crowd:
         """Who was taken for somebody since a return gets a number of his own."""
         other = self.welcome(person.place, comeback.since)
         person.exchange(other, comeback.since)
+        person.gallery = comeback.known
         person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
         for each in self.unmeet(person, comeback):
             each.meet(other)

@@ -73,6 +73,7 @@ class Comeback:
     def __init__(self, person: Person, time: float, against: float, place: bool = False) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
+        person.gallery.trust = math.inf
         self.likely: Likely | None = None
         self._new, self._place = math.exp(against), place
         self._mine, self._others = Tally(), dict[int, Tally]()

@@ -180,8 +180,9 @@ class Looks:
     Attributes:
         roots: ``(SLICES, n * LIGHTNESS, TINTS * TINTS)``.
         area, color: ``(n, SLICES)``.
-        most: ``(n,)`` float32, how alike a slice of each counts at the most: as much as it is
-            trusted to be of whom it is taken for, see :meth:`Gallery.doubt`.
+        most: ``(n, 2)`` float32, how alike a slice of each counts at the most, and the log-odds of
+            its vector: as much as it is trusted to be of whom it is taken for, see
+            :meth:`Gallery.doubt`.
         vectors: ``(n, d)``, of a network; NaN for views without, and of no columns if none has one.
     """
 
@@ -208,7 +209,7 @@ class Looks:
             np.concatenate([v.roots for v in views], axis=1),
             np.stack([v.area for v in views]),
             np.stack([v.color for v in views]),
-            np.float32(even) + trusted / np.float32(STEEPNESS),
+            np.stack([np.float32(even) + trusted / np.float32(STEEPNESS), trusted], axis=1),
             _stacked([_NONE if v.described is None else v.described.vector[None] for v in views]),
         )
 
@@ -272,7 +273,7 @@ class Compared:
             rows = np.s_[:, first : first + MOST_ROWS]
             np.matmul(looks.roots[rows], view.roots.transpose(0, 2, 1), out=cross[rows])
         alike = (cross.reshape(SLICES, len(looks), -1) @ _DIAGONALS).transpose(1, 0, 2)
-        np.minimum(alike, looks.most[:, None, None], out=alike)
+        np.minimum(alike, looks.most[:, :1, None], out=alike)
         return cls(weight, alike, _network(view, looks))
 
     def similarity(self) -> Floats:
@@ -315,8 +316,9 @@ def _network(view: View, looks: Looks) -> Floats:
     if described is None or not looks.vectors.shape[1]:
         return np.full(len(looks), np.nan, np.float32)
     cosines = looks.vectors @ described.vector
-    odds: Floats = (cosines - np.float32(described.even)) * np.float32(described.steepness)
-    return odds
+    odds = (cosines - np.float32(described.even)) * np.float32(described.steepness)
+    least: Floats = np.minimum(odds, looks.most[:, 1])
+    return least
 
 
 def _best(weight: Floats, alike: Floats) -> Floats:
@@ -386,6 +388,9 @@ MOST_VIEWS = 14
 NOVEL = 0.9
 """Likeness to the nearest view from which a new one adds nothing. At 0.63 sides are missing, and
 everyone's IDF1 was 3 points lower; with all taken it was the same (docs/experiments.md)."""
+SURER = 0.5
+"""Log-odds by which a new view is surer than one that it adds nothing to, from which it takes its
+place: with less it would in every frame of a return that is borne out little by little."""
 HEIGHT_MEMORY = 25
 """Heights of one person that are remembered: some seconds, so that a stoop does not stay."""
 
@@ -406,12 +411,13 @@ class Gallery:
         views: the first and the newest.
         looks: the same stacked, None while there is none.
         top: median height of the head above the floor in metres, None where it is not known.
+        trust: log-odds that what is learned now is of this person.
         mixed: whether the only view is of a piece cut out of two who touched, so that it shows
             something of either: it speaks against nobody until a view of one alone takes its place.
     """
 
     def __init__(self) -> None:
-        self.mixed = False
+        self.mixed, self.trust = False, math.inf
         self.views: list[View] = []
         self.looks: Looks | None = None
         self.top: float | None = None
@@ -482,17 +488,28 @@ class Gallery:
             view: the view.
             time: seconds, when it was seen.
         """
-        if self.looks is not None:
-            if (similarity(view, self.looks) > NOVEL).any():
+        self._learn(_Learned(view, time, self.trust))
+
+    def _learn(self, new: _Learned) -> None:
+        learned = self._learned
+        if learned:
+            alike = similarity(new.view, Looks.of(self.views)) > NOVEL
+            twins = [each for each, is_twin in zip(learned, alike.tolist(), strict=True) if is_twin]
+            if any(each.trust >= new.trust - SURER for each in twins):
                 return
-            if len(self.views) >= MOST_VIEWS:
-                # Of the two most alike the older goes, never the first, which is what was chosen.
-                redundant = self._most_redundant()
-                del self._learned[redundant]
-        self._set_learned([*self._learned, _Learned(view, time)])
+            learned = [each for each in learned if each not in twins]
+            if len(learned) >= MOST_VIEWS:
+                del learned[self._most_redundant()]
+        self._set_learned([*learned, new])
+
+    def restore(self, known: Gallery) -> None:
+        """Have what was known before again, where what was learned since has taken its place."""
+        for each in known._learned:
+            if each not in self._learned:
+                self._learn(each)
 
     def doubt(self, since: float, odds: float) -> None:
-        """What was learned from ``since`` on, in seconds, is so likely of this person.
+        """What was learned from ``since`` on, in seconds, and is from now on, is so likely of him.
 
         Who is like a view is this person no surer than the view itself is of him.
 
@@ -500,6 +517,7 @@ class Gallery:
             since: seconds.
             odds: log-odds.
         """
+        self.trust = odds
         if any(each.time >= since and each.trust > odds for each in self._learned):
             self._set_learned(
                 [
@@ -511,13 +529,13 @@ class Gallery:
     def take(self, other: Gallery) -> None:
         """Take all that another gallery has, which has turned out to be of the same person."""
         for each in other._learned:
-            self.learn(each.view, each.time)
+            self._learn(each)
         self._set_tops(sorted(self._tops + other._tops))
 
     def copy(self) -> Gallery:
         """The same views and heights; what either learns from now on is its own."""
         same = Gallery()
-        same.mixed = self.mixed
+        same.mixed, same.trust = self.mixed, self.trust
         same._set_learned(list(self._learned))
         same._set_tops(list(self._tops))
         return same
@@ -528,6 +546,7 @@ class Gallery:
         for gallery, mine in ((late, True), (self, False)):
             gallery._set_learned([each for each in self._learned if (each.time >= since) == mine])
             gallery._set_tops([each for each in self._tops if (each[0] >= since) == mine])
+        late._set_learned([_Learned(each.view, each.time) for each in late._learned])
         return late
 
     def _set_learned(self, learned: list[_Learned]) -> None:
@@ -541,7 +560,13 @@ class Gallery:
         self.top = float(median(top for _, top in self._tops)) if self._tops else None
 
     def _most_redundant(self) -> int:
-        assert self.looks is not None
-        likeness = np.nan_to_num(np.stack([similarity(v, self.looks) for v in self.views]))
+        """Of those least trusted the one most alike another, the older of two.
+
+        Never the first, which is what was chosen.
+        """
+        looks = Looks.of(self.views)
+        likeness = np.nan_to_num(np.stack([similarity(v, looks) for v in self.views]))
         np.fill_diagonal(likeness, 0)
-        return 1 + int(np.argmax(likeness[1:].max(axis=1)))
+        most = likeness.max(axis=1).tolist()
+        rest = range(1, len(self.views))
+        return min(rest, key=lambda n: (self._learned[n].trust, -most[n], n))
