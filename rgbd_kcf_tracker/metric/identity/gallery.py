@@ -251,14 +251,15 @@ class Compared:
     Attributes:
         weight: ``(n, SLICES)`` float32, how much each slice says: by how much of it shows, how
             colourful it is and :data:`HEAD_WEIGHT`; 0 where it does not show in both.
-        alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1
-            and no more than :attr:`Looks.most`.
+        alike: ``(n, SLICES, len(DIMMER))`` float32 likeness at each shift of lightness, 0 to 1.
+        most: ``(n, 1)`` float32, up to which that counts, see :attr:`Looks.most`.
         network: ``(n,)`` float32 log-odds of being the same person by the vectors alone, NaN where
             either has none.
     """
 
     weight: Floats
     alike: Floats
+    most: Floats
     network: Floats
 
     @classmethod
@@ -273,8 +274,7 @@ class Compared:
             rows = np.s_[:, first : first + MOST_ROWS]
             np.matmul(looks.roots[rows], view.roots.transpose(0, 2, 1), out=cross[rows])
         alike = (cross.reshape(SLICES, len(looks), -1) @ _DIAGONALS).transpose(1, 0, 2)
-        np.minimum(alike, looks.most[:, :1, None], out=alike)
-        return cls(weight, alike, _network(view, looks))
+        return cls(weight, alike, looks.most[:, :1], _network(view, looks))
 
     def similarity(self) -> Floats:
         """How alike the view is in its colours to each of the others, ``(n,)``, 0 to 1.
@@ -284,9 +284,14 @@ class Compared:
         """
         return _best(self.weight, self.alike)
 
+    @property
+    def _trusted(self) -> Floats:
+        alike: Floats = np.minimum(self.alike, self.most[..., None])
+        return alike
+
     def likeness(self) -> Floats:
-        """``(n, 2)``: :meth:`similarity` and :attr:`network` of each of the others."""
-        return np.stack([self.similarity(), self.network], axis=1)
+        """``(n, 2)``: :meth:`similarity` and :attr:`network` of each, as far as it is trusted."""
+        return np.stack([_best(self.weight, self._trusted), self.network], axis=1)
 
     def of_each(self, starts: Sequence[int]) -> Floats:
         """The :meth:`likeness` of the view to each of several people, ``(p, 2)``: to his best view.
@@ -302,10 +307,11 @@ class Compared:
         """
         most = np.maximum.reduceat(self.weight, starts, axis=0)
         shows = self.weight > 0
-        best = np.maximum.reduceat(self.alike * shows[..., None], starts, axis=0)
+        trusted = self._trusted
+        best = np.maximum.reduceat(trusted * shows[..., None], starts, axis=0)
         whose = np.repeat(np.arange(len(starts)), np.diff([*starts, len(shows)]))
         weight = np.where(shows, self.weight, most[whose])
-        alike = np.where(shows[..., None], self.alike, best[whose])
+        alike = np.where(shows[..., None], trusted, best[whose])
         found = np.maximum.reduceat(_best(weight, alike), starts)
         return np.stack([found, np.fmax.reduceat(self.network, starts)], axis=1)
 
@@ -492,8 +498,8 @@ class Gallery:
 
     def _learn(self, new: _Learned) -> None:
         learned = self._learned
-        if learned:
-            alike = similarity(new.view, Looks.of(self.views)) > NOVEL
+        if self.looks is not None:
+            alike = similarity(new.view, self.looks) > NOVEL
             twins = [each for each, is_twin in zip(learned, alike.tolist(), strict=True) if is_twin]
             if any(each.trust >= new.trust - SURER for each in twins):
                 return
@@ -564,8 +570,8 @@ class Gallery:
 
         Never the first, which is what was chosen.
         """
-        looks = Looks.of(self.views)
-        likeness = np.nan_to_num(np.stack([similarity(v, looks) for v in self.views]))
+        assert self.looks is not None
+        likeness = np.nan_to_num(np.stack([similarity(v, self.looks) for v in self.views]))
         np.fill_diagonal(likeness, 0)
         most = likeness.max(axis=1).tolist()
         rest = range(1, len(self.views))
