@@ -488,7 +488,7 @@ class Gallery:
         self._set_tops([*self._tops, (time, top)])
 
     def learn(self, view: View, time: float) -> None:
-        """Take a view that is surely of this person, where it shows something new.
+        """Take a view of this person, as sure as :attr:`trust`, where it shows something new.
 
         Args:
             view: the view.
