@@ -1516,6 +1516,12 @@ def test_what_was_learned_in_a_return_that_is_not_borne_out_tells_nobody(chosen)
     assert len(one.gallery.views) == views + 1, 'more of him may show'
     for _ in range(4):
         watched.see(Someone(0.05, 3.0), dt=0.2)
+    # What is learned of him from now on is as doubtful, until he is chosen or is somebody else.
+    comebacks = watched.crowd._comebacks
+    assert comebacks.trust(one) == (math.inf if chosen else pytest.approx(-10, abs=6))
+    one.chosen = True
+    assert comebacks.trust(one) == math.inf
+    one.chosen = chosen
     # Who was chosen is asked for elsewhere whether he is the one who came back.
     assert (one.gallery.log_odds(look(BLUE, GREY)) > 0) == chosen
 
@@ -1596,7 +1602,9 @@ def test_who_came_beside_one_who_had_his_number_can_be_given_it_back():
     for each in (beside, newcomer):
         each.meet(taken)
     before.meet(newcomer)
+    crowd._comebacks.add(taken, 4.0, 0.0)
     crowd._exchange(taken, None, 4.0)
+    assert crowd._comebacks.trust(taken) == math.inf
     stranger = crowd.people[-1]
     assert stranger.met == {newcomer.number}
     assert newcomer.met == {stranger.number, before.number}

@@ -384,7 +384,6 @@ class Follower:
         if self._comeback is not None:
             self._comeback.settle(person)
             person.gallery.restore(self._comeback.known)
-            person.gallery.trust = math.inf
             if not self._comeback.borne_out:
                 self._crowd.unmeet(person, self._comeback)
         self._comeback = None

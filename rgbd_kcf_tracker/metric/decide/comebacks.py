@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from rgbd_kcf_tracker.metric.decide.account import Account
@@ -13,7 +14,7 @@ from rgbd_kcf_tracker.metric.identity.person import Person
 
 
 class Comebacks:
-    """The last return of each, which is heard for some seconds."""
+    """The last return of each."""
 
     def __init__(self) -> None:
         self._comebacks: dict[int, Comeback] = {}
@@ -22,6 +23,11 @@ class Comebacks:
     def sure(self) -> dict[int, float]:
         """How likely each is whom he was taken for, 0 to 1, by numbers."""
         return {n: each.likely.score for n, each in self._comebacks.items() if each.likely}
+
+    def trust(self, person: Person) -> float:
+        """Log-odds that what is learned of somebody is his."""
+        comeback = self._comebacks.get(person.number)
+        return math.inf if comeback is None or person.chosen else comeback.trust
 
     def add(self, person: Person, since: float, against: float) -> None:
         """Somebody whom nobody chose came back, at ``since`` seconds."""

@@ -471,7 +471,8 @@ class Crowd:
             person.came = account.time
             if person.gallery.views and not person.chosen:
                 self._comebacks.add(person, person.came, account.against)
-        learn_sighting(account, row, seen, index, sure)
+        trust = self._comebacks.trust(person)
+        learn_sighting(account, row, seen, index, sure, trust)
 
 
 def _followed(

@@ -37,7 +37,9 @@ LEAP = 0.5
 of him is from another, and than he walks in a third of a second."""
 
 
-def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sure: bool) -> None:
+def learn_sighting(
+    account: Account, row: int, seen: Silhouette, index: int, sure: bool, trust: float
+) -> None:
     """Learn of one person what a sighting tells.
 
     Args:
@@ -46,6 +48,7 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
         seen: the silhouette.
         index: of the sight that it is, -1 where it is no figure.
         sure: whether it is surely that person: else nothing but the place is learned.
+        trust: log-odds that who has that person's number since he came back is he.
     """
     person, scene = account.people[row], account.scene
     place = account.place(seen)
@@ -101,7 +104,7 @@ def learn_sighting(account: Account, row: int, seen: Silhouette, index: int, sur
         person.gallery.learn_height(view.top, account.time)
     if whole or not person.gallery.views:
         described = account.described(view, box_about(scene, seen))
-        person.gallery.learn(described, account.time)
+        person.gallery.learn(described, account.time, trust)
 
 
 def _came(scene: Scene, seen: Silhouette) -> bool:

@@ -68,13 +68,14 @@ class Comeback:
         known: the views and heights from before.
         met: numbers of those who had been seen beside the target.
         likely: what was heard last; None before anything was.
+        trust: log-odds that what is learned of him is of the target, as it was settled last.
     """
 
     def __init__(self, person: Person, time: float, against: float, place: bool = False) -> None:
         self.since, self.left = time, person.seen_at
         self.known, self.met = person.gallery.copy(), frozenset(person.met)
-        person.gallery.trust = math.inf
         self.likely: Likely | None = None
+        self.trust = math.inf
         self._new, self._place = math.exp(against), place
         self._mine, self._others = Tally(), dict[int, Tally]()
 
@@ -124,7 +125,8 @@ class Comeback:
     def settle(self, person: Person) -> None:
         """What was learned of somebody since is his as surely as it was he who came back."""
         if self.likely is not None:
-            person.gallery.doubt(self.since, logit(self.likely.score))
+            self.trust = logit(self.likely.score)
+            person.gallery.doubt(self.since, self.trust)
 
     def _look(self, tally: Tally, view: View, time: float) -> None:
         if time - tally.last >= AGAIN and self.known.stands(view.top, view.leans):

@@ -417,13 +417,12 @@ class Gallery:
         views: the first and the newest.
         looks: the same stacked, None while there is none.
         top: median height of the head above the floor in metres, None where it is not known.
-        trust: log-odds that what is learned now is of this person.
         mixed: whether the only view is of a piece cut out of two who touched, so that it shows
             something of either: it speaks against nobody until a view of one alone takes its place.
     """
 
     def __init__(self) -> None:
-        self.mixed, self.trust = False, math.inf
+        self.mixed = False
         self.views: list[View] = []
         self.looks: Looks | None = None
         self.top: float | None = None
@@ -487,14 +486,15 @@ class Gallery:
         """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""
         self._set_tops([*self._tops, (time, top)])
 
-    def learn(self, view: View, time: float) -> None:
-        """Take a view of this person, as sure as :attr:`trust`, where it shows something new.
+    def learn(self, view: View, time: float, trust: float = math.inf) -> None:
+        """Take a view of this person, where it shows something new or shows it more surely.
 
         Args:
             view: the view.
             time: seconds, when it was seen.
+            trust: log-odds that it is of this person.
         """
-        self._learn(_Learned(view, time, self.trust))
+        self._learn(_Learned(view, time, trust))
 
     def _learn(self, new: _Learned) -> None:
         learned = self._learned
@@ -515,7 +515,7 @@ class Gallery:
                 self._learn(each)
 
     def doubt(self, since: float, odds: float) -> None:
-        """What was learned from ``since`` on, in seconds, and is from now on, is so likely of him.
+        """What was learned from ``since`` on, in seconds, is no likelier of this person.
 
         Who is like a view is this person no surer than the view itself is of him.
 
@@ -523,7 +523,6 @@ class Gallery:
             since: seconds.
             odds: log-odds.
         """
-        self.trust = odds
         if any(each.time >= since and each.trust > odds for each in self._learned):
             self._set_learned(
                 [
@@ -541,7 +540,7 @@ class Gallery:
     def copy(self) -> Gallery:
         """The same views and heights; what either learns from now on is its own."""
         same = Gallery()
-        same.mixed, same.trust = self.mixed, self.trust
+        same.mixed = self.mixed
         same._set_learned(list(self._learned))
         same._set_tops(list(self._tops))
         return same
