@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from itertools import count, islice
 
@@ -141,10 +142,12 @@ def test_publishers_of_either_reliability_are_heard(rig: Rig, reliability: str) 
         assert rig.box().iou(scene(9)[2]) > 0.6
 
 
-def test_publishers_that_cannot_be_heard_are_told(
-    rig: Rig, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """Each once on the log with what mends it, and in diagnostics for as long as it is so."""
+def test_publishers_that_cannot_be_heard_are_told(rig: Rig) -> None:
+    """Each once on the log with what mends it, and in diagnostics for as long as it is so.
+
+    The tracker is a process of its own: within one, Fast DDS has once in some hundred runs kept a
+    publisher from another context that was made just before.
+    """
     best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
     for publisher in (rig.color, rig.depth, rig.init):
         rig.node.destroy_publisher(publisher)
@@ -166,7 +169,7 @@ def test_publishers_that_cannot_be_heard_are_told(
         '/rig publishes best effort on /tracker/init, where reliable is asked for: '
         'publish it reliable'
     )
-    with running_node(rig, wait=False, reliability='reliable'):
+    with tracker_process('-p', 'reliability:=reliable') as process:
         silent = f'no image on /color/image yet: {color}'
         rig.wait(lambda: rig.values().get('message') == silent, 20, 'why')
         rig.fresh_values()  # it is on the log when it was so twice
@@ -183,9 +186,10 @@ def test_publishers_that_cannot_be_heard_are_told(
 
         rig.wait(told, 20, 'the others')
         assert rig.values()['level'] == '1'
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=20)[0]
     other.destroy_node()
     rclpy.shutdown(context=context)
-    said = capfd.readouterr().err
     assert [said.count(words) for words in (color, depth, init)] == [1, 1, 1]
 
 
