@@ -1467,8 +1467,8 @@ def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
     assert claim.mine > 0
     assert claim.rival < claim.mine
     assert wrong.rival > wrong.mine
-    assert account.probability(account.people.index(one), columns[0]) > 0.9
-    assert account.probability(account.people.index(one), columns[1]) < 0.1
+    assert account.probability(one, columns[0]) > 0.9
+    assert account.probability(one, columns[1]) < 0.1
 
 
 @pytest.mark.parametrize('away', [True, False])

@@ -168,7 +168,7 @@ class BySurface:
         others = account.others(self.person, self._parameters.use_room)
         found = propose(scene, self.body, expected, others, self._parameters.most_candidates)
         # Where his own figure is known, what holds somebody else besides is no proposal.
-        most = STANDING if self.person not in account.owners else MIXED
+        most = STANDING if self.person not in account.in_view else MIXED
         free = [seen for seen in found if others.share(seen) < most]
         free += [
             sight.figure.seen

@@ -398,12 +398,12 @@ class Follower:
         index = account.sight_of(seen)
         if index < 0:
             return None
-        figure, owner = account.sights[index].figure, account.owner[index]
+        figure, owner = account.sights[index].figure, account.owner_of(index)
         if figure.parted or figure.seen.area < MORE * max(seen.area, self._shown):
             return None
         if not TALLER < figure.seen.height < HEIGHT[1] or figure.seen.width > WIDTH[1]:
             return None
-        if owner >= 0 and account.people[owner] is not person:
+        if owner is not None and owner is not person:
             return None
         return figure.seen if _as_deep(account, figure.seen, seen) else None
 
@@ -596,15 +596,12 @@ def _likely(
     mine = -1 if found is None else account.sight_of(found.seen)
     look = None if found is None else account.look(found.seen)
     others = {
-        account.people[owner].number: account.sights[index].view
-        for index, owner in enumerate(account.owner)
-        if owner >= 0
-        and index != mine
-        and account.people[owner] is not person
-        and account.people[owner].number not in comeback.met
+        other.number: account.sights[index].view
+        for other, index in account.in_view.items()
+        if index != mine and other is not person and other.number not in comeback.met
     }
     known = account.as_others(person, mine)
-    followed = {person.number for person in account.owners if person.chosen}
+    followed = {person.number for person in account.in_view if person.chosen}
     return comeback.hear(look, others, known, account.time, followed)
 
 

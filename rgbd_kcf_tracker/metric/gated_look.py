@@ -269,17 +269,17 @@ class GatedLook:
         drawn = self.drawn
         if drawn is not None and drawn.unlike(account.sights[index].view):
             return True
-        if account.owner[index] < 0:
+        owner = account.owner_of(index)
+        if owner is None:
             return False
-        owner = account.people[account.owner[index]]
         before = owner.first_seen <= self._since and owner.number not in self._people
         beside = owner.chosen or owner.number in self._newcomers.beside
         return before or (drawn is not None and beside)
 
     def _of_another(self, account: Account, whole: Silhouette) -> bool:
         """Whether a figure is another target."""
-        index = account.sight_of(whole)
-        return index >= 0 and (row := account.owner[index]) >= 0 and account.people[row].chosen
+        owner = account.owner_of(account.sight_of(whole))
+        return owner is not None and owner.chosen
 
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.
@@ -369,8 +369,8 @@ def _area(view: DepthView, look: Look) -> float:
 def _people_about(account: Account, box: Box) -> frozenset[int]:
     """Numbers of all of whom something shows in a box: the target may be any of them."""
     kinds = np.unique(account.parts.kinds[_part(account.scene, box)])
-    owners = (account.owner[kind - FIRST] for kind in kinds.tolist() if kind >= FIRST)
-    return frozenset(account.people[owner].number for owner in owners if owner >= 0)
+    owners = (account.owner_of(kind - FIRST) for kind in kinds.tolist() if kind >= FIRST)
+    return frozenset(owner.number for owner in owners if owner is not None)
 
 
 def room_share(account: Account, box: Box) -> float:

@@ -363,8 +363,8 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
     """What has the shape of a person; or the size, of what the image's ends cut off."""
     scene = account.scene
     for index, sight in enumerate(account.sights):
-        seen, owner = sight.figure.seen, account.owner[index]
-        known = owner >= 0 and account.people[owner].upright
+        seen, owner = sight.figure.seen, account.owner_of(index)
+        known = owner is not None and owner.upright
         if known or upright(seen, scene.view.intrinsics, account.look(seen).top):
             yield seen
     for label in np.flatnonzero(_overlaps_of(scene, box) > SIZE_IOU).tolist():

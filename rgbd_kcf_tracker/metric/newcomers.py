@@ -64,9 +64,9 @@ class Newcomers:
     def keep(self, account: Account, box: Box) -> None:
         """Take where the target is: all who show beside it are others, whoever passes it later."""
         self.beside |= {
-            account.people[owner].number
-            for owner, sight in zip(account.owner, account.sights, strict=True)
-            if owner >= 0 and box_about(account.scene, sight.figure.seen).intersection(box) == 0
+            person.number
+            for person, index in account.in_view.items()
+            if box_about(account.scene, account.sights[index].figure.seen).intersection(box) == 0
         }
 
     def find(
@@ -96,7 +96,7 @@ class Newcomers:
             # Whoever was welcomed in this very frame has just been found to be another's target.
             if row >= len(account.looks):
                 continue
-            person = account.people[row] if row >= 0 else None
+            person = account.owner_of(column)
             if person is not None and person.chosen:  # another target
                 continue
             met = person is not None and (

@@ -60,10 +60,10 @@ class PersonFinder:
         if account is None:
             return None
         found: list[Sight] = []
-        for sight, owner in zip(account.sights, account.owner, strict=True):
-            if owner < 0 or not self._near < sight.figure.seen.depth < self._far:
+        for person, index in account.in_view.items():
+            sight = account.sights[index]
+            if not self._near < sight.figure.seen.depth < self._far:
                 continue
-            person = account.people[owner]
             sure = person.alive and person.sightings >= SIGHTINGS
             if (
                 sure

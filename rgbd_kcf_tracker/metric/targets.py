@@ -284,14 +284,14 @@ class MetricTargets:
     def _names_again(self, account: Account, before: dict[int, Track]) -> dict[int, int]:
         """The ids of those whom nobody chose and who are where they were a frame ago."""
         names: dict[int, int] = {}
-        for column, row in enumerate(account.owner):
-            if row < 0 or account.people[row].number in self._names:
+        for person, index in account.in_view.items():
+            if person.number in self._names:
                 continue
-            box = outline_box(account.scene, account.sights[column].figure.seen)
+            box = outline_box(account.scene, account.sights[index].figure.seen)
             for name, track in before.items():
                 near = track.box is not None and track.box.iou(box) >= SAME_BOX
                 if near and name not in names.values():
-                    names[account.people[row].number] = name
+                    names[person.number] = name
                     break
         return names
 
@@ -422,19 +422,16 @@ class MetricTargets:
             for seen in (f.seen, f.glimpsed)
             if seen is not None
         }
-        for column, row in enumerate(account.owner):
-            if row < 0 or column in shown:
+        for person, index in account.in_view.items():
+            if index in shown or person.number in chosen or not person.alive:
                 continue
-            person = account.people[row]
-            if person.number in chosen or not person.alive:
-                continue
-            seen = account.sights[column].figure.seen
+            seen = account.sights[index].figure.seen
             box = outline_box(account.scene, seen)
             belief = in_metres(sighted(account.scene.view, seen), frame)
             tracks[self._name(person)] = Track(
                 box,
                 TrackState.TRACKING,
-                account.probability(row, column),
+                account.probability(person, index),
                 seen.depth,
                 None if belief is None else triple(belief.position),
                 id=self._name(person),

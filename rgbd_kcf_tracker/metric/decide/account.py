@@ -136,9 +136,14 @@ class Account:
         return Parts(self.scene, [sight.figure.seen for sight in self.sights])
 
     @property
-    def owners(self) -> list[Person]:
-        """Whoever a sight of the frame is of."""
-        return [self.people[row] for row in self.owner if row >= 0]
+    def in_view(self) -> dict[Person, int]:
+        """Whoever a sight of the frame is of, and the index of that."""
+        return {self.people[row]: index for index, row in enumerate(self.owner) if row >= 0}
+
+    def owner_of(self, index: int) -> Person | None:
+        """Whoever a sight is of; None for nobody, as for no sight, -1."""
+        row = self.owner[index] if index >= 0 else -1
+        return self.people[row] if row >= 0 else None
 
     @property
     def calm(self) -> list[tuple[Person, Calm, Silhouette]]:
@@ -153,9 +158,11 @@ class Account:
     @property
     def unmoved(self) -> list[tuple[Person, Silhouette]]:
         """Those in view whom nobody chose and who have never walked, and where they are."""
-        pairs = zip(self.owner, self.sights, strict=True)
-        seen = [(self.people[row], sight.figure.seen) for row, sight in pairs if row >= 0]
-        return [each for each in seen if not each[0].chosen and each[0].travelled < TRAVELLED]
+        return [
+            (person, self.sights[index].figure.seen)
+            for person, index in self.in_view.items()
+            if not person.chosen and person.travelled < TRAVELLED
+        ]
 
     def was_away(self, person: Person) -> bool:
         """Whether somebody has been absent for so long that his place says little."""
@@ -168,15 +175,16 @@ class Account:
             place = self._places[seen] = place_of(self.scene, seen)
         return place
 
-    def probability(self, row: int, column: int) -> float:
+    def probability(self, person: Person, index: int) -> float:
         """That a sight is of one of the people rather than of any other, 0 to 1."""
+        row = self.people.index(person)
         if row >= len(self.odds):
             return NEW_SCORE
-        odds = self.odds[:, column]
+        odds = self.odds[:, index]
         others = np.delete(odds, row)
         total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
         here = float(1 / (1 + total * np.exp(-min(odds[row], 30))))
-        return here * self.sure.get(self.people[row].number, 1.0)
+        return here * self.sure.get(person.number, 1.0)
 
     def sight_of(self, seen: Silhouette) -> int:
         """Index of the sight that most of a silhouette's pixels belong to, -1 for none."""
@@ -310,10 +318,9 @@ class Account:
             person: he.
             room: whether the room counts.
         """
-        met = [
-            owner >= 0 and self.people[owner].number in person.met and person.area >= SMALL
-            for owner in self.owner
-        ]
+        met = [False] * len(self.sights)
+        for other, index in self.in_view.items():
+            met[index] = other.number in person.met and person.area >= SMALL
         return Others(self.parts, [False, room and person.mobile, *met])
 
     def stranger(self, person: Person, index: int) -> Person | None:
@@ -321,10 +328,8 @@ class Account:
 
         That is somebody who was never seen beside him.
         """
-        if index < 0 or self.owner[index] < 0:
-            return None
-        other = self.people[self.owner[index]]
-        if other is person or other.chosen or other.number in person.met:
+        other = self.owner_of(index)
+        if other is None or other is person or other.chosen or other.number in person.met:
             return None
         return other
 
@@ -367,9 +372,9 @@ class Account:
     def somebody(self) -> npt.NDArray[np.bool_]:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
         mask = np.zeros(self.scene.view.shape, np.bool_)
-        for sight, owner in zip(self.sights, self.owner, strict=True):
-            if owner >= 0 and self.people[owner].alive:
-                seen = sight.figure.seen
+        for person, index in self.in_view.items():
+            if person.alive:
+                seen = self.sights[index].figure.seen
                 mask[seen.rows, seen.cols] |= seen.mask
         return mask
 

@@ -43,14 +43,14 @@ class Comebacks:
         """Hear how those of all who are known look in a frame, by what was known before."""
         if not self._comebacks:
             return
-        owners = {account.people[row]: n for n, row in enumerate(account.owner) if row >= 0}
+        in_view = account.in_view
         here = {p.number: p for p in people if not p.chosen}
         self._comebacks = {n: each for n, each in self._comebacks.items() if n in here}
         for number, comeback in self._comebacks.items():
             person = here[number]
-            if person in owners:
-                view = account.sights[owners[person]].view
-                known = account.as_others(person, owners[person])
+            if person in in_view:
+                view = account.sights[in_view[person]].view
+                known = account.as_others(person, in_view[person])
                 comeback.hear(view, {}, known, account.time)
                 if comeback.enough:
                     comeback.settle(person)

@@ -128,10 +128,9 @@ class Crowd:
 
     def _chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         index = account.figure_of(seen)
-        owner = account.owner[index] if index >= 0 else -1
+        person = account.owner_of(index)
         rest = [] if index < 0 else beside(account.scene, account.sights[index].figure.seen, seen)
-        if owner >= 0:
-            person = account.people[owner]
+        if person is not None:
             if rest and person.first_seen == account.time:
                 other = self._new_at(account, seen, person)
                 if other is not None and not other.chosen:
@@ -146,11 +145,11 @@ class Crowd:
                 person.chosen = True
                 self._welcome_beside(account, person, rest)
                 return person
-        for person in account.people:  # what was chosen in this frame and is no figure, once more
-            last = person.last if person.seen_at == account.time else None
+        for again in account.people:  # what was chosen in this frame and is no figure, once more
+            last = again.last if again.seen_at == account.time else None
             if last is not None and last.same(seen):
-                person.chosen = True
-                return person
+                again.chosen = True
+                return again
         person = self.welcome(account.place(seen), account.time, chosen=True)
         account.people.append(person)
         if index >= 0:
@@ -407,12 +406,11 @@ class Crowd:
     def _introduce(self, account: Account, targets: dict[int, Silhouette | None]) -> None:
         """Remember who was seen beside whom: they are surely not the same."""
         seen_now: list[tuple[Person, FloatArray]] = []
-        for column, row in enumerate(account.owner):
-            figure = account.sights[column].figure
-            if row < 0 or account.people[row].number in targets:
+        for person, index in account.in_view.items():
+            figure = account.sights[index].figure
+            if person.number in targets or figure.parted or figure.seen.area <= WHOLE:
                 continue
-            if figure.seen.area > WHOLE and not figure.parted:
-                seen_now.append((account.people[row], figure.place))
+            seen_now.append((person, figure.place))
         for person in account.people:
             seen = targets.get(person.number)
             if seen is not None:
