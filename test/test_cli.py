@@ -430,6 +430,14 @@ def test_info(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     source = write_mcap(tmp_path / 'b.mcap', camera_messages(make_frames(3), depth=None))
     assert main(['info', str(source)]) == 0
     assert 'warning: no depth was recorded: read as colour alone' in capsys.readouterr().out
+    unregistered = write_folder(tmp_path / 'unregistered', count=3)
+    (image,) = unregistered.glob('depth/000001.*')
+    depth = cv2.imread(str(image), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(image), depth[:-4, :-8])
+    assert main(['info', str(unregistered)]) == 0
+    high, wide = depth.shape
+    told = f'warning: depth is {wide - 8}x{high - 4} but colour is {wide}x{high}: register'
+    assert told in capsys.readouterr().out
     source = write_mcap(tmp_path / 'c.mcap', camera_messages(make_frames(3), info=None)[1::2])
     assert main(['info', str(source)]) == 0
     text = capsys.readouterr().out

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
@@ -46,10 +47,23 @@ def describe_recording(
     require_source(path)
     try:
         with open_recording(path, options) as recording:
-            return recording.info()
+            return _with_odd_sizes(recording.info())
     except RecordingError as error:
         if is_sequence_folder(Path(path)):
             raise
         from rgbd_kcf_tracker.recordings.bags import describe_bag
 
         return describe_bag(Path(path), str(error))
+
+
+def _with_odd_sizes(info: RecordingInfo) -> RecordingInfo:
+    """The same, with a warning where depth does not fit colour, which no frame can be made of."""
+    sizes = {stream.role: stream.size for stream in info.streams if stream.size is not None}
+    depth, color = sizes.get('depth'), sizes.get('color')
+    if depth is None or color is None or depth == color:
+        return info
+    warning = (
+        f'depth is {depth[0]}x{depth[1]} but colour is {color[0]}x{color[1]}: '
+        'register the depth to the colour image first'
+    )
+    return replace(info, warnings=(*info.warnings, warning))

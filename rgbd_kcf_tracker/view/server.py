@@ -446,7 +446,7 @@ def _bound(host: str, port: int) -> socket.socket:
             f'{host!r} is no name or address of this machine: give another host'
         ) from None
     except (OSError, OverflowError) as error:
-        reason = getattr(error, 'strerror', None) or error
+        reason = getattr(error, 'strerror', None) or str(error).rstrip('.')
         wrong = 'host' if getattr(error, 'errno', None) == errno.EADDRNOTAVAIL else 'port'
         raise ParameterError(
             f'{host}:{port} cannot be listened on: {reason}; name another {wrong}'
