@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.fading import Lately, about, around, fading
+from rgbd_kcf_tracker.metric.perceive.figures import Figure, _low
 from rgbd_kcf_tracker.metric.perceive.paint import DIFFERS, Paint
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room, tolerance
 from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
@@ -131,6 +133,42 @@ def test_who_falls_is_followed_where_he_lies(single: bool):
     assert np.mean(seen) > 0.95, [i + 12 for i, each in enumerate(seen) if not each]
 
 
+def test_who_falls_towards_the_camera_is_followed_where_he_lies():
+    """Seen along his body he is little of what he was; his size had spoken against him."""
+    tracker, seen = create_tracker('metric'), []
+    for i in range(12, 70):
+        z, wide, high = 2.9, 0.5, {30: 1.15, 31: 0.7}.get(i, 0.36)
+        one = Someone(min(-1.2 + 0.1 * (i - 5), 0.0), z, RED, BLACK)
+        frame, box = shown(*images([one]), i), one.box
+        if i >= 30:
+            z = max(z - 0.25 * (i - 29), 2.3)
+            color, depth = images([])
+            for low, top, paint in ((0.02, 0.7 * high, RED), (0.7 * high, high, SKIN)):
+                pixels = part(z, (-wide / 2, wide / 2), (low, top))
+                color[pixels], depth[pixels] = paint, z
+            rows, cols = part(z, (-wide / 2, wide / 2), (0.02, high))
+            box = Box(cols.start, rows.start, cols.stop - cols.start, rows.stop - rows.start)
+            frame = shown(color, depth, i)
+        track = tracker.start(frame, box) if i == 12 else tracker.update(frame)
+        seen.append(track.box is not None and track.box.iou(box) > 0.5)
+    assert np.mean(seen) > 0.9, [i + 12 for i, each in enumerate(seen) if not each]
+
+
+def test_a_table_beside_which_he_was_chosen_is_not_he_lying():
+    """As who comes into view beside it and is gone in the next frame, at 5 Hz (real people)."""
+    tracker, track = create_tracker('metric'), None
+    for i in range(20):
+        color, depth = images([])
+        table = part(2.75, (-0.6, -0.25), (0.0, 0.75))
+        if i < 6:
+            one = Someone(-0.1 * (5 - i), 2.8, RED, BLACK)
+            color, depth = images([one])
+        color[table], depth[table] = (210, 215, 215), 2.75
+        frame = shown(color, depth, 2 * i)
+        track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
+    assert track.box is None
+
+
 def test_who_sits_there_for_long_is_no_part_of_the_sofa():
     """Pixels that hardly showed for a frame were learned as the room, and more in the next."""
     told = followed(
@@ -209,6 +247,22 @@ def test_who_has_left_a_sofa_is_not_there():
 
 def silhouette(depth: np.ndarray, left: int, top: int, mask: np.ndarray) -> Silhouette:
     return Silhouette.of(DepthView(depth, 1, CAMERA), left, top, mask, 0, Rim())
+
+
+def test_of_several_low_ones_he_is_the_one_that_is_most_where_he_was_or_below():
+    """As beside who steps over him, of whom a part is taken for a figure."""
+    depth = np.full((ROWS, COLS), 2.0, np.float32)
+
+    def figure(left: int, top: int, wide: int, high: int) -> Figure:
+        seen = silhouette(depth, left, top, np.ones((high, wide), np.bool_))
+        return Figure(seen, np.zeros(2), False)
+
+    scene = SimpleNamespace(lately=[figure(40, 60, 60, 30).seen])
+    over, lies = figure(70, 40, 30, 50), figure(35, 70, 60, 30)
+    assert _low(scene, [over], [lies]) == [lies], 'less of who steps over him is there'
+    assert _low(scene, [figure(40, 62, 60, 30)], [lies]) == [], 'he is a figure'
+    assert _low(scene, [], [figure(35, 88, 60, 20)]), 'he has fallen on'
+    assert _low(scene, [], [figure(110, 70, 60, 30)]) == [], 'beside'
 
 
 def test_the_colours_of_the_room_are_learned_where_it_shows_and_what_differs_is_told():

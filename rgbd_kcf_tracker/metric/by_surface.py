@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.metric.decide.proposals import (
     gathered,
     propose,
 )
+from rgbd_kcf_tracker.metric.decide.sighting import has_come
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, visible_box
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
 from rgbd_kcf_tracker.metric.identity.hidden_cloud import HiddenCloud
@@ -66,6 +67,8 @@ a third, a side view or what hides him smaller by as much."""
 PLACED_MIDDLE = 0.4
 """Share of the body's height from its upper end down to where the camera must see past a particle:
 the belly, which is broad and which a table hides less often than legs."""
+END_ON = 0.25
+"""Share of a body that shows of one who lies, seen along his body: his breadth by his depth."""
 LEARN_FRACTION = 0.6
 """Visible share from which a body of which nothing is cut off is learned from: more than half, as a
 smaller part has not all of its colours."""
@@ -380,6 +383,11 @@ class BySurface:
         placed = body.place(seen, scene.codes, scene.view, motion.position, sigma, stands)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
+        fraction = placed.fraction
+        if not stands and claim.mine > 0 and has_come(scene, seen):
+            # He falls as fast as nobody walks, and shows less, seen along his body.
+            away[1] = 0.0
+            fraction = max(fraction, min(1.0, fraction / END_ON))
         if self._cloud is not None:
             step = self._cloud.distance(placed.position, placed.sigma)
         else:
@@ -395,7 +403,7 @@ class BySurface:
         evidence = Evidence(
             step=step,
             stride=float((away / (variance + at_will)).sum()),
-            fraction=placed.fraction,
+            fraction=fraction,
             height=_misfit(
                 seen.height,
                 body.height,

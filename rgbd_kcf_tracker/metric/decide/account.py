@@ -20,7 +20,7 @@ from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
-from rgbd_kcf_tracker.metric.identity.person import COAST, TRAVELLED, Person
+from rgbd_kcf_tracker.metric.identity.person import COAST, FALLS, TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.fading import Lately
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -365,8 +365,8 @@ class Account:
         return [
             Lately(person.last, person.area, person.misses > 0)
             for person in self.people
-            if person.last is not None and person.alive and person.hidden and person.figure
-            if self.time - person.seen_at <= COAST
+            if person.last is not None and person.alive and (person.figure or person.upright)
+            if self.time - person.seen_at <= (COAST if person.hidden else FALLS)
         ]
 
     def somebody(self) -> npt.NDArray[np.bool_]:

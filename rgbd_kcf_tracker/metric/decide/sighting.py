@@ -89,7 +89,7 @@ def learn_sighting(
             return
     person.upright = (
         person.upright
-        or (account.settled and person_sized(seen, view.top) and _came(scene, seen))
+        or (account.settled and person_sized(seen, view.top) and has_come(scene, seen))
         or upright(seen, scene.view.intrinsics, view.top)
     )
     alone = index < 0 or not account.sights[index].figure.parted
@@ -107,7 +107,7 @@ def learn_sighting(
         person.gallery.learn(described, account.time, trust)
 
 
-def _came(scene: Scene, seen: Silhouette) -> bool:
+def has_come(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette has come to where it is, and did not stand behind somebody before."""
     vacant = scene.vacant[seen.rows, seen.cols][seen.mask]
     return float(vacant.mean()) > VACANT and came(scene, seen)

@@ -53,9 +53,9 @@ WIDEST, TALLEST = 0.9, 2.2
 UPRIGHT = 1.0
 """Metres of height of each of two pieces beside each other, together at least :data:`BROAD`, from
 which they are two people: no limb is that tall."""
-STAYS = 0.5
+STAYS, FALL = 0.5, 0.35
 """Share of the smaller of the boxes about two outlines that both have where both are of one who
-falls: at 3 m/s he has fallen by a third of a metre in the next frame at 10 Hz."""
+falls, and metres by which he has fallen from one frame to the next: at 3 m/s, at 10 Hz."""
 LOW = 0.9
 """Metres above the floor below which heads side by side are none, but knees, or an arm."""
 AT_REST = 1.0
@@ -201,23 +201,25 @@ def _has_lain_down(scene: Scene, left: int, top: int, mask: Mask) -> bool:
 
 
 def _low(scene: Scene, found: list[Figure], refused: list[Figure]) -> list[Figure]:
-    """Of those that are no figures the largest where each was who is in none, however low it is."""
+    """Of those that are no figures the one where each was who is in none, however low it is."""
     low: list[Figure] = []
     for before in scene.lately:
-        if any(_falls_to(before, figure.seen) for figure in found):
-            continue
-        his = [each for each in refused if each not in low and _falls_to(before, each.seen)]
+        most = max((_falls_to(before, figure.seen) for figure in found), default=0.0)
+        his = [(_falls_to(before, each.seen), each) for each in refused if each not in low]
+        his = [each for each in his if each[0] > max(most, STAYS)]
         if his:
-            low.append(max(his, key=lambda figure: figure.seen.area))
+            low.append(max(his, key=lambda each: each[1].seen.area)[1])
     return low
 
 
-def _falls_to(before: Silhouette, seen: Silhouette) -> bool:
-    """Whether a silhouette is about where another was, so that both may be of one who falls."""
+def _falls_to(before: Silhouette, seen: Silhouette) -> float:
+    """Share of where a silhouette is that is where another was, or below, as of one who falls."""
     if abs(seen.depth - before.depth) > depth_step(before.depth):
-        return False
-    was, now = (Box(s.left, s.top, s.mask.shape[1], s.mask.shape[0]) for s in (before, seen))
-    return was.intersection(now) > STAYS * min(was.area, now.area)
+        return 0.0
+    deeper = FALL / before.height * before.mask.shape[0]
+    was = Box(before.left, before.top, before.mask.shape[1], before.mask.shape[0] + deeper)
+    now = Box(seen.left, seen.top, seen.mask.shape[1], seen.mask.shape[0])
+    return was.intersection(now) / min(was.area, now.area)
 
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:
