@@ -544,6 +544,68 @@ def test_two_publishers_are_no_bag_that_loops(apart_s: int, begun_anew: int) -> 
     assert len(anew) == begun_anew
 
 
+def image(array: np.ndarray, encoding: str) -> SimpleNamespace:
+    """A message of an image, without ROS."""
+    made = message(BASE, array.tobytes())
+    made.height, made.width = array.shape[:2]
+    made.step, made.encoding, made.is_bigendian = array.strides[0], encoding, 0
+    return made
+
+
+@pytest.mark.parametrize(
+    ('what', 'used', 'counted'),
+    [
+        ('walks', 16, {'frozen_depth': 24}),  # half a second
+        ('noise', 40, {}),  # depth that stands still is right where nothing moves
+        ('stands', 40, {}),
+        ('covered', 40, {'empty_depth': 40}),
+    ],
+)
+def test_depth_that_hangs_is_left_out_and_told(
+    what: str, used: int, counted: dict[str, int]
+) -> None:
+    statistics = Statistics()
+    silent = SimpleNamespace(image_wanted=True)
+    process = Processor(session()[0], silent, statistics, time.time_ns, statistics.error)
+    rng = np.random.default_rng(4)
+    picture = rng.integers(80, 160, (240, 320, 3), np.uint8)
+    depth = np.full((240, 320), 0 if what == 'covered' else 2000, np.uint16)
+
+    def has_depth(index: int, depth: np.ndarray) -> bool:
+        color = picture.copy()
+        if what in ('walks', 'covered'):
+            color[60:180, 100 + 2 * index : 140 + 2 * index] = (20, 40, 200)
+        elif what == 'noise':
+            color += rng.integers(0, 16, color.shape, np.uint8)
+        capture = Capture(image(color, 'bgr8'), image(depth, '16UC1'), None, 0)
+        return process.frame(capture, BASE + index * 33 * MS).depth is not None
+
+    seen = [has_depth(index, depth) for index in range(40)]
+    assert seen == [True] * used + [False] * (40 - used)
+    assert statistics.snapshot().counts == counted
+    if what == 'walks':
+        assert 'repeats one image: restart it' in statistics.snapshot().last_error
+        depth[5, 5] += 1
+        assert has_depth(40, depth)
+
+
+def test_a_picture_that_stands_still_for_seconds_is_told_and_used() -> None:
+    statistics = Statistics()
+    silent = SimpleNamespace(image_wanted=True)
+    process = Processor(session()[0], silent, statistics, time.time_ns, statistics.error)
+    state = NodeState('tracker', 'active', topic='/color/image', publishers=1)
+    words = {}
+    for index in range(240):
+        color = image(np.full((24, 32, 3), index == 200, np.uint8), 'bgr8')
+        statistics.image_came()
+        assert process.frame(Capture(color, None, None, 0), BASE + index * 33 * MS) is not None
+        if index in (150, 199, 239):
+            words[index] = judge(state, statistics.snapshot())[1]
+    assert words[150] == words[239] == 'IDLE'
+    assert 'has not changed by a single bit' in words[199]
+    assert '/color/image' in words[199]
+
+
 def until(condition: Callable[[], object]) -> None:
     end = time.monotonic() + 30
     while not condition():

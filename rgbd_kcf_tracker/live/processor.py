@@ -19,6 +19,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.insight import Insight
 from rgbd_kcf_tracker.live.answer import Answer
+from rgbd_kcf_tracker.live.frozen import COLOR_AFTER_NS, LEAST_IMAGES, FrozenDepth, Repeated
 from rgbd_kcf_tracker.live.places import CameraPlaces, Places
 from rgbd_kcf_tracker.live.session import IDLE, Choice, Session
 from rgbd_kcf_tracker.live.settings import RAW
@@ -136,6 +137,7 @@ class Processor:
         self._fault = fault
         self._places = places
         self._timeline = Timeline()
+        self._repeated, self._frozen = Repeated(), FrozenDepth()
         self._last: _Answered | None = None
         self._frame_id: str | None = None
         self._restarts = self._steady = 0
@@ -260,9 +262,12 @@ class Processor:
         except ImageError as error:
             self._fault('bad_color', f'colour image cannot be read: {error}')
             return None
+        self._repeated.take(capture.color.data, time_ns)
+        if self._repeated.images >= LEAST_IMAGES and self._repeated.lasted_ns >= COLOR_AFTER_NS:
+            self._statistics.count('frozen_color')
         depth: DepthImage | None = None
         if capture.depth is not None and self._depth_wanted():
-            depth = self._readable_depth(capture.depth, color)
+            depth = self._readable_depth(capture.depth, color, time_ns)
         return Frame(color, depth, time_ns, self._fitting(capture.camera, color))
 
     def _fitting(self, camera: Camera | None, color: ColorImage) -> Intrinsics | None:
@@ -280,7 +285,7 @@ class Processor:
         uses = VARIANTS[self.session.variant].uses_depth
         return uses or self.session.choosing
 
-    def _readable_depth(self, message: Any, color: ColorImage) -> DepthImage | None:
+    def _readable_depth(self, message: Any, color: ColorImage, time_ns: int) -> DepthImage | None:
         refused: list[int] = []
         try:
             depth = self._decode_depth(message, refused=refused.append)
@@ -288,6 +293,7 @@ class Processor:
         except RgbdKcfError as error:
             self._fault('bad_depth', f'depth image cannot be used: {error}')
             return None
+        frozen = self._frozen(message.data, color, time_ns)
         # One pixel in 256 is enough to tell an empty image from a sparse one, and metres.
         sample = depth[::16, ::16]
         if not (sample > 0).any() and not (depth > 0).any():
@@ -295,6 +301,12 @@ class Processor:
                 'empty_depth',
                 'depth image has no reading at all: is the sensor covered, or its 32FC1 no metres?',
             )
+        elif frozen:
+            self._fault(
+                'frozen_depth',
+                'the depth driver repeats one image: restart it; until then colour alone counts',
+            )
+            return None
         elif refused:
             self._fault('odd_depth', f'depth image has numbers that are {NO_METRES}')
         return depth

@@ -28,6 +28,9 @@ PACE_NS, STILL = (5_000_000, 100_000_000), 3
 come so until they count: that camera has no clock and sees what stands still. Copies come at once,
 or after longer, as a replay in lock-step sends an image again until it is answered."""
 
+SPARSE = 1009
+"""Of so many bytes one is compared first: a prime number, so that they lie in all columns."""
+
 
 @dataclass(frozen=True, slots=True)
 class Instant:
@@ -106,7 +109,7 @@ class StampRepair:
         """The stamp to pair by; None where the message is the last one over again."""
         gap, self._came = arrival_ns - self._came, arrival_ns
         if stamp_ns == self._stamp:
-            if _same(data, self._data):
+            if same_bytes(data, self._data):
                 self._paced = self._paced + 1 if PACE_NS[0] <= gap < PACE_NS[1] else 0
                 if self._paced <= STILL:
                     return None
@@ -132,8 +135,9 @@ class StampRepair:
         return stamp_ns + arrival_ns - self._first
 
 
-def _same(data: Any, other: Any) -> bool:
-    one, two = as_bytes(data), as_bytes(other)
-    return len(one) == len(two) and np.array_equal(
-        np.frombuffer(one, np.uint8), np.frombuffer(two, np.uint8)
-    )
+def same_bytes(data: Any, other: Any) -> bool:
+    """Whether two messages are the same to the last bit; mostly a few of their bytes tell."""
+    one, two = (np.frombuffer(as_bytes(d), np.uint8) for d in (data, other))
+    if len(one) != len(two) or not np.array_equal(one[::SPARSE], two[::SPARSE]):
+        return False
+    return np.array_equal(one, two)

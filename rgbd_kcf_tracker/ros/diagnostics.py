@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.track import TrackState
 
 RECENT_ERROR_S = 5.0
 ALARMING_SHARE = 0.1
-"""A tenth of the images dropped or without partner is worth a warning."""
+"""A tenth of the images dropped, repeated or without partner is worth a warning."""
 LATENCY_NAMES = ('mean', 'median', 'p99', 'max')
 
 
@@ -64,6 +64,7 @@ def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
     came = max(snapshot.recent.get('color_received', 0), 1)
     # Images that wait for a depth that never comes are dropped too: the cause is said first.
     wrong = [error, _without_depth(state, snapshot, came), _dropped(snapshot, came)]
+    wrong.append(_frozen(state, snapshot, came))
     wrong += [why for name, why in state.unheard.items() if name not in (COLOR, DEPTH)]
     if any(wrong):
         return DiagnosticStatus.WARN, '; '.join(text for text in wrong if text)
@@ -90,6 +91,15 @@ def _dropped(snapshot: Snapshot, came: int) -> str:
     if dropped <= ALARMING_SHARE * came:
         return ''
     return f'tracking is slower than the camera: {dropped} of {came} images dropped'
+
+
+def _frozen(state: NodeState, snapshot: Snapshot, came: int) -> str:
+    if snapshot.recent.get('frozen_color', 0) <= ALARMING_SHARE * came:
+        return ''
+    return (
+        f'the picture on {state.topic} has not changed by a single bit for seconds: restart the '
+        'camera driver, unless it is a simulator in which nothing moves'
+    )
 
 
 def _without_depth(state: NodeState, snapshot: Snapshot, came: int) -> str:

@@ -54,6 +54,7 @@ SOURCES = {
     'bad_depth': DEPTH,
     'empty_depth': DEPTH,
     'odd_depth': DEPTH,
+    'frozen_depth': DEPTH,
     'bad_camera_info': CAMERA_INFO,
 }
 """The inputs of which faults of these kinds are."""

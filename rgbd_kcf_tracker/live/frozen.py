@@ -1,0 +1,82 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a camera still sends what it sees: a driver that hangs may repeat its last image.
+
+Each time with a new stamp, so that it looks like any other. What a sensor measures is never twice
+the same to the last bit; what a simulator without noise shows is, for as long as nothing moves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from rgbd_kcf_tracker.live.timeline import same_bytes
+from rgbd_kcf_tracker.recordings.images import ColorImage
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
+
+DEPTH_AFTER_NS, LEAST_IMAGES = NANOSECONDS // 2, 4
+"""Depth that was the same for so long, in so many images, hangs where the picture has changed."""
+COLOR_AFTER_NS = 5 * NANOSECONDS
+"""A picture that was the same for so long may hang; of a simulator it may be right."""
+COARSE = 64, 48
+"""Fields of a picture, whose mean colours tell a change from noise."""
+CHANGED, LEAST_FIELDS = 6, 3
+"""Levels by which so many fields differ where something has moved."""
+
+
+class Repeated:
+    """How often, and for how long, one stream has sent the same bytes."""
+
+    def __init__(self) -> None:
+        self._data: Any = None
+        self._since_ns = 0
+        self.images = 0
+        self.lasted_ns = 0
+
+    def take(self, data: Any, time_ns: int) -> None:
+        """The next image; the last one over again, as the same object, says nothing."""
+        if data is self._data:
+            return
+        if self._data is None or not same_bytes(data, self._data):
+            self._since_ns, self.images = time_ns, 0
+        self._data = data
+        self.images += 1
+        self.lasted_ns = time_ns - self._since_ns
+
+
+class FrozenDepth:
+    """Whether depth stands still while the picture beside it goes on."""
+
+    def __init__(self) -> None:
+        self._repeated = Repeated()
+        self._before: npt.NDArray[np.int16] | None = None
+        self._changed = False
+
+    def __call__(self, data: Any, color: ColorImage, time_ns: int) -> bool:
+        """Take in a pair.
+
+        A change of the picture counts, not its noise: that of a simulator may be noise alone, and
+        where nothing moves, depth that stands still is right.
+
+        Args:
+            data: bytes of the depth message.
+            color: the picture.
+            time_ns: of the pair, rising.
+        """
+        self._repeated.take(data, time_ns)
+        if self._repeated.images < 2:
+            self._before, self._changed = None, False
+            return False
+        if not self._changed:
+            now = cv2.resize(color, COARSE, interpolation=cv2.INTER_AREA).astype(np.int16)
+            if self._before is None:
+                self._before = now
+            by = np.abs(now - self._before).max(axis=2)
+            self._changed = int(np.count_nonzero(by > CHANGED)) >= LEAST_FIELDS
+        long = self._repeated.lasted_ns >= DEPTH_AFTER_NS
+        return self._changed and long and self._repeated.images >= LEAST_IMAGES
