@@ -467,6 +467,29 @@ def test_depth_that_is_lost_on_the_way_is_an_alarm(patient: bool) -> None:
     assert 'found no depth of their time' in judge(state, snapshot)[1]
 
 
+@pytest.mark.parametrize(
+    ('stamps_ms', 'late'),
+    [
+        ([at - 400 * (at // 33 % 2) for at in range(0, 3300, 33)], '50 of 100'),  # two publish
+        ([-at // 20 for at in range(0, 3300, 33)], '99 of 100'),  # the clock goes back
+        ([at - 40 * (at % 627 == 0) for at in range(0, 3300, 33)], ''),  # a few change places
+    ],
+)
+def test_images_that_are_passed_over_for_newer_ones_are_an_alarm(
+    stamps_ms: list[int], late: str
+) -> None:
+    made = intake()
+    made.depth_expected = False
+    for index, stamp in enumerate(stamps_ms):
+        made.color(message(BASE + stamp * MS), index * 33 * MS)
+    state = NodeState('tracker', 'active', topic='/color/image', publishers=1, uses_depth=False)
+    snapshot = made._statistics.snapshot()
+    assert snapshot.counts['late'] > 3
+    level, sentence = judge(state, snapshot)
+    assert (level != b'\0') == bool(late), sentence
+    assert sentence == 'IDLE' or f'{late} images on /color/image came after a newer' in sentence
+
+
 def test_ages_are_counted_from_when_the_node_listens_again() -> None:
     statistics = Statistics()
     statistics.listening()

@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.track import TrackState
 
 RECENT_ERROR_S = 5.0
 ALARMING_SHARE = 0.1
-"""A tenth of the images dropped, repeated or without partner is worth a warning."""
+"""A tenth of the images dropped, late, repeated or without partner is worth a warning."""
 LATENCY_NAMES = ('mean', 'median', 'p99', 'max')
 
 
@@ -64,7 +64,7 @@ def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
     came = max(snapshot.recent.get('color_received', 0), 1)
     # Images that wait for a depth that never comes are dropped too: the cause is said first.
     wrong = [error, _without_depth(state, snapshot, came), _dropped(snapshot, came)]
-    wrong.append(_frozen(state, snapshot, came))
+    wrong += [_late(state, snapshot, came), _frozen(state, snapshot, came)]
     wrong += [why for name, why in state.unheard.items() if name not in (COLOR, DEPTH)]
     if any(wrong):
         return DiagnosticStatus.WARN, '; '.join(text for text in wrong if text)
@@ -91,6 +91,16 @@ def _dropped(snapshot: Snapshot, came: int) -> str:
     if dropped <= ALARMING_SHARE * came:
         return ''
     return f'tracking is slower than the camera: {dropped} of {came} images dropped'
+
+
+def _late(state: NodeState, snapshot: Snapshot, came: int) -> str:
+    late = snapshot.recent.get('late', 0)
+    if late <= ALARMING_SHARE * came:
+        return ''
+    return (
+        f'{late} of {came} images on {state.topic} came after a newer one and were passed over: '
+        'do two publish there, or does the clock of the camera go back?'
+    )
 
 
 def _frozen(state: NodeState, snapshot: Snapshot, came: int) -> str:
