@@ -219,6 +219,46 @@ def test_ids_stay_when_the_variant_changes() -> None:
     assert made.others[0].box.iou(SECOND.box) > 0.5
 
 
+def test_a_change_waits_for_the_hidden_and_drops_only_with_words() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 5)
+    run(made, 5, 5, [FIRST, THIRD])
+    assert made.others[0].box is None
+    made.configure('metric', default_parameters('metric').replace(lost_after=5.0))
+    run(made, 10, 5, [FIRST, THIRD])
+    assert made.asked_for == {1, 2}
+    at_work = made._targets
+    run(made, 15, 10)
+    assert made._targets is not at_work
+    assert ids(made) == [1, 2]
+    assert made.others[0].box.iou(SECOND.box) > 0.6
+    # Where he does not come back, the change is not put off for ever, nor he dropped silently.
+    run(made, 25, 5, [FIRST, THIRD])
+    made.configure('kcf', default_parameters('kcf'))
+    run(made, 30, 99, [FIRST, THIRD])
+    assert (made.variant, made.asked_for, refused) == ('metric', {1, 2}, [])
+    run(made, 129, 3, [FIRST, THIRD])
+    assert (made.variant, made.asked_for) == ('kcf', {1})
+    assert [words[:18] for words in refused] == ['target 2 is hidden']
+
+
+def test_a_change_waits_for_the_only_one_left_however_long() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 5)
+    made.remove(1)
+    run(made, 5, 5, [FIRST, THIRD])
+    made.configure('rgbd', default_parameters('rgbd'))
+    for number in range(10, 400, 10):
+        run(made, number, 1, [FIRST, THIRD])
+    assert (made.variant, made.asked_for) == ('metric', {2})
+    run(made, 400, 10)
+    assert (made.variant, ids(made), refused) == ('rgbd', [2], [])
+
+
 def test_everyone_keeps_his_id_when_parameters_change() -> None:
     made, refused, _ = session()
     made.everyone = True

@@ -39,6 +39,8 @@ REQUESTS_CREDIT_S = 0.3
 """So much of it is saved up: a few requests in a row are met at once."""
 MOST_ADDITIONS = 50
 """Targets that wait to be added at most."""
+HIDDEN_WAIT_NS = 10_000_000_000
+"""So long a change of variant or parameters waits for those who were added and are hidden."""
 _ALREADY = 'what is in that box is followed already, as target {}'
 
 _warm: set[str] = set()
@@ -89,6 +91,7 @@ class Session:
     ) -> None:
         self._variant, self._parameters = variant, parameters
         self._wanted = (variant, parameters)
+        self._waits_from: int | None = None
         self._targets = self._empty = TargetSet(variant, parameters)
         self._everyone = False
         self._chosen: int | None = None
@@ -256,7 +259,7 @@ class Session:
         except RgbdKcfError as error:
             self._report(str(error))
             return
-        self._wanted = (variant, parameters)
+        self._wanted, self._waits_from = (variant, parameters), None
         if not self.following:
             self._renew()
 
@@ -427,12 +430,27 @@ class Session:
         self._story.follow(self.track, frame.stamp_ns)
 
     def _take_over(self, frame: Frame) -> None:
-        """Go over to what is wanted, with all who are seen, once the chosen one is."""
+        """Go over to what is wanted, once all are seen who were chosen or added.
+
+        The chosen one is waited for, and who is the only one left; the others so long, and those
+        who are hidden then are dropped.
+        """
         if self._current:
             return
-        if self._chosen is not None and not _shown(self.track, frame):
-            return
+        if self._waits_from is None:
+            self._waits_from = frame.stamp_ns
         asked = self.asked_for
+        hidden = [
+            track.id
+            for track in (self.track, *self.others)
+            if track.id in asked and not _shown(track, frame)
+        ]
+        if hidden and (
+            self.track.id in hidden
+            or len(hidden) == len(asked)
+            or frame.stamp_ns - self._waits_from < HIDDEN_WAIT_NS
+        ):
+            return
         targets = self._empty.anew()
         everyone = self._everyone and targets.metric is not None
         ids: dict[int, int] = {}
@@ -446,6 +464,11 @@ class Session:
             self._wanted = (self._variant, self._parameters)
             self._empty = self._targets
             return
+        for number in hidden:
+            self._report(
+                f'target {number} is hidden, also {HIDDEN_WAIT_NS / 1e9:.0f} s after variant or '
+                'parameters were changed: it is dropped'
+            )
         for inner, number in ids.items():
             if number not in asked:  # known from now on, by that id, and followed with everyone
                 targets.remove(inner)
