@@ -102,6 +102,22 @@ def test_a_box_of_what_is_followed_adds_nothing_with_any_variant() -> None:
         ]
 
 
+@pytest.mark.parametrize('variant', ['kcf', 'rgbd', 'rgbd_pf', 'metric'])
+def test_who_was_added_and_is_chosen_keeps_his_id_and_is_followed_once(variant: str) -> None:
+    made, refused, _ = session(variant)
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    made.add(lambda _: THIRD.box)
+    run(made, 0, 3)
+    made.choose(lambda _: SECOND.box.moved(3, 2))
+    run(made, 3, 3)
+    assert (made.track.id, ids(made), len(made._targets)) == (2, [2, 3], 2)
+    assert made.track.box.iou(SECOND.box) > 0.5
+    made.remove(2)
+    run(made, 6, 1)
+    assert (ids(made), len(made._targets), refused) == ([3], 1, [])
+
+
 def test_so_many_are_followed_at_once_and_no_more() -> None:
     made, refused, _ = session('kcf')
     made.most = 2

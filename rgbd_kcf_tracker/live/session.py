@@ -320,16 +320,15 @@ class Session:
             self._report(str(error))
 
     def _shown_in(self, box: Box) -> int | None:
-        """The id of the target that was chosen or added, and that a box shows."""
+        """The id of the target that was chosen or added, and that a box shows best."""
         known = self.asked_for
-        return next(
-            (
-                track.id
-                for track in (self.track, *self.others)
-                if track.id in known and track.box is not None and track.box.iou(box) >= SAME_BOX
-            ),
-            None,
-        )
+        shown = [
+            (track.box.iou(box), track.id)
+            for track in (self.track, *self.others)
+            if track.id in known and track.box is not None
+        ]
+        overlap, number = max(shown, default=(0.0, 0))
+        return number if overlap >= SAME_BOX else None
 
     def _add(self, frame: Frame, box: Box) -> None:
         inner = self._targets.add(frame, box)
@@ -344,10 +343,12 @@ class Session:
     def start(self, frame: Frame, box: Box) -> bool:
         """Take this target; where that fails, the one that is followed is kept, and it is said.
 
-        Alone, it starts with nothing remembered; among others, with what is known of all.
+        Alone, it starts with nothing remembered; among others, with what is known of all. One of
+        those who were added keeps his id, and is followed once.
         """
         among = self._added or self._targets.everyone
         targets = self._targets if among else self._empty.anew()
+        shown = self._shown_in(box)
         try:
             inner = targets.add(frame, box)
         except RgbdKcfError as error:
@@ -359,6 +360,11 @@ class Session:
             self._targets.remove(self._chosen)
         if inner in self._added:
             self._added.remove(inner)
+        if targets.metric is None:  # which knows by itself who is in a box
+            for old in [i for i in self._added if self._ids[i] == shown]:
+                targets.remove(old)
+                self._added.remove(old)
+                self._ids[inner] = self._ids.pop(old)
         self._chosen = inner
         self.track = self._named(targets.started(inner))
         self.others = tuple(t for t in self.others if t.id != self.track.id)
