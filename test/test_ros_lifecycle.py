@@ -20,6 +20,7 @@ pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 import rclpy
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
+from onnx_files import average_pool
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_rig import Rig, box_text, overrides, running_node, scene, tracker_process
@@ -262,6 +263,26 @@ def test_parameters_while_running(rig: Rig) -> None:
         assert set_parameter(rig, 'init_box', [float(v) for v in scene(6)[2].as_tuple()]).successful
         rig.play([6])
         assert rig.box().as_tuple() == scene(6)[2].as_tuple()
+
+
+def test_a_file_that_is_no_network_is_refused_and_blocks_nothing(rig: Rig, tmp_path: Path) -> None:
+    junk, network = tmp_path / 'junk.onnx', tmp_path / 'means.onnx'
+    junk.write_text('no network')
+    network.write_bytes(average_pool())
+    with running_node(rig, variant='kcf') as node:
+        for name, value, reason in (
+            ('metric.embedding', str(junk), 'cannot run'),
+            ('metric.embedding', str(network), ''),
+            ('metric.lost_after', 9.0, ''),
+            ('metric.embedding', str(junk), 'cannot run'),
+            ('metric.embedding', '', ''),
+            ('variant', 'metric', ''),
+        ):
+            (result,) = node.set_parameters([Parameter(name, value=value)])
+            assert (result.successful, reason in result.reason) == (not reason, True)
+        rig.wait(lambda: node._session.variant == 'metric')
+        assert node._session._parameters.lost_after == 9.0
+        assert 'rejected_requests' not in node.statistics.snapshot().counts
 
 
 def test_a_pair_is_set_in_any_order(rig: Rig) -> None:

@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.live.settings import (
     parse_box,
 )
 from rgbd_kcf_tracker.parameters import ParameterInfo, Parameters, Scalar, checked, describe
+from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.variants import VARIANTS
 
 ROS_NAMES = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
@@ -139,18 +140,31 @@ class ParameterServer:
 
     def _on_set(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         own = self._values('', NodeParameters)
+        values: dict[str, Scalar] = {}
         try:
             for given in parameters:
                 info = self._infos.get(given.name)
-                if info is None:
-                    continue
-                value = coerced(info, given.value)
-                if given.name in own:
-                    own[given.name] = value
-            NodeParameters(**own)
+                if info is not None:
+                    values[given.name] = coerced(info, given.value)
+            NodeParameters(**(own | {name: values[name] for name in own if name in values}))
+            self._read_files(values)
         except ParameterError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _read_files(self, values: Mapping[str, Scalar]) -> None:
+        """Read what new values name: a file that cannot be used would stop every later change.
+
+        Raises:
+            ParameterError: where one cannot be used.
+        """
+        for name, value in values.items():
+            if not self._infos[name].file or value in ('', self._node.get_parameter(name).value):
+                continue
+            variant = name.partition('.')[0]
+            cls, prefix = VARIANTS[variant].parameters, f'{variant}.'
+            given = {n.removeprefix(prefix): v for n, v in values.items() if n.startswith(prefix)}
+            TargetSet(variant, cls(**(self._values(prefix, cls) | given)))
 
     def _after_set(self, parameters: Sequence[Parameter]) -> None:
         names = frozenset(p.name for p in parameters if p.name in self._infos)
