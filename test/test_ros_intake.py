@@ -538,6 +538,18 @@ def test_timeline_rises_whatever_the_stamps_do(
     assert sum(m.restarted for m in moments) == restarts
 
 
+@pytest.mark.parametrize('pause_s', [61, 3600])
+def test_a_camera_that_pauses_is_no_jump(pause_s: int) -> None:
+    """And goes on at the time that it is; while a clock that was set meanwhile is one."""
+    for set_s, jumped in ((0, False), (-2, False), (61, True), (-pause_s - 1, True)):
+        line = Timeline()
+        line.advance(BASE, 0)
+        moment = line.advance(BASE + (pause_s + set_s) * 1000 * MS, pause_s * 1000 * MS)
+        assert moment.jumped == jumped
+        if not jumped:
+            assert moment.time_ns == BASE + (pause_s + set_s) * 1000 * MS
+
+
 def test_restarts_are_counted_over_all_configurations() -> None:
     statistics = Statistics()
     publishers = SimpleNamespace(

@@ -20,7 +20,8 @@ from rgbd_kcf_tracker.recordings.images import as_bytes
 from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
 LARGEST_STEP_NS = 60 * NANOSECONDS
-"""A larger step forward is taken for a wrong stamp or a new recording, not for a pause."""
+"""A step forward that is larger than the time since the last image by more than this is taken for a
+wrong stamp or a new recording, not for a pause."""
 LEAST_STEP_NS = 1_000_000
 """Time goes on by this much at the least where a stamp does not."""
 PACE_NS, STILL = (5_000_000, 100_000_000), 3
@@ -38,7 +39,7 @@ class Instant:
 
     Attributes:
         time_ns: rising strictly; equal to the stamps until the first fault in them.
-        jumped: the stamps left their course here: back, or more than a minute ahead.
+        jumped: the stamps left their course here: back, or ahead by a minute more than went by.
         restarted: they went back for good, as a loop does; not the return from one wrong stamp.
     """
 
@@ -67,15 +68,15 @@ class Timeline:
             self._time, self._stamp, self._arrival = stamp_ns, stamp_ns, arrival_ns
             return Instant(stamp_ns)
         step = stamp_ns - self._stamp
-        waited = min(max(arrival_ns - self._arrival, LEAST_STEP_NS), LARGEST_STEP_NS)
+        waited = max(arrival_ns - self._arrival, LEAST_STEP_NS)
         jumped = restarted = False
-        if not 0 < step <= LARGEST_STEP_NS:
+        if not 0 < step <= waited + LARGEST_STEP_NS:
             jumped = step != 0
             old = self._before_jump
             returned = old is not None and 0 < stamp_ns - old <= LARGEST_STEP_NS
             restarted = step < 0 and not returned
             self._before_jump = self._stamp if step > 0 else None
-            step = waited
+            step = min(waited, LARGEST_STEP_NS)
         elif self._before_jump is not None:
             self._before_jump = None  # two images on the new course: it is the course now
         self._time += step
