@@ -19,11 +19,13 @@ from rgbd_kcf_tracker import Box, Frame, Intrinsics, Track, TrackState
 from rgbd_kcf_tracker.live.intake import PATIENT_DEPTHS, Intake
 from rgbd_kcf_tracker.live.processor import Capture, Processor
 from rgbd_kcf_tracker.live.session import Session
+from rgbd_kcf_tracker.live.settings import NodeParameters
 from rgbd_kcf_tracker.live.statistics import Statistics, Times
 from rgbd_kcf_tracker.live.timeline import StampRepair, Timeline
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, judge
+from rgbd_kcf_tracker.ros.requests import Requests
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 MS = 1_000_000
@@ -577,6 +579,27 @@ def test_two_publishers_are_no_bag_that_loops(apart_s: int, begun_anew: int) -> 
         image = message(BASE + index * 33 * MS - other)
         process(Capture(image, None, None, index * 33 * MS))
     assert len(anew) == begun_anew
+
+
+@pytest.mark.parametrize(
+    ('values', 'kept'),
+    [
+        ({'on_time_jump': 'restart'}, True),  # nothing would choose him again
+        ({'on_time_jump': 'restart', 'auto_init': True}, False),
+        ({'on_time_jump': 'restart', 'init_box': '1,2,30,40'}, False),
+        ({'init_box': '1,2,30,40'}, True),
+    ],
+)
+def test_a_loop_drops_nobody_where_nothing_would_choose_him_again(
+    values: dict[str, object], kept: bool
+) -> None:
+    made, _ = session()
+    process = Processor(made, SimpleNamespace(), Statistics(), time.time_ns, pytest.fail)
+    Requests(process, lambda: NodeParameters(**values), pytest.fail, pytest.fail)
+    made.start(frame(), Box(60, 40, 30, 40))
+    process.on_restart()
+    assert made.following == kept
+    assert made.choosing == ('init_box' in values and not kept)
 
 
 def image(array: np.ndarray, encoding: str) -> SimpleNamespace:

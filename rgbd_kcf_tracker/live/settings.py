@@ -72,7 +72,8 @@ class NodeParameters(Parameters):
     )
     on_time_jump: str = parameter(
         KEEP,
-        'When stamps jump back (a bag that loops): keep the target, or restart from init_box.',
+        'When stamps jump back (a bag that loops): keep the target, or restart from init_box or '
+        'auto_init, where one of them is set.',
         choices=(KEEP, RESTART),
     )
     pair_tolerance: float = parameter(

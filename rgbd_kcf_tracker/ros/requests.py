@@ -120,11 +120,14 @@ class Requests:
         self._in_worker(CHOICE, lambda: self._processor.choose(choice, oldest_s))
 
     def _on_restart(self) -> None:
-        """The stamps went back for good, as a loop does (in the worker's thread)."""
+        """The stamps went back for good, as a loop does (in the worker's thread).
+
+        Who was chosen otherwise than by a parameter is kept: nothing would choose him again.
+        """
         settings = self._settings()
-        if settings.on_time_jump != RESTART:
+        box: Box | None = parse_box(settings.init_box)
+        if settings.on_time_jump != RESTART or (box is None and not settings.auto_init):
             return
         self._session.reset()
-        box: Box | None = parse_box(settings.init_box)
         if box is not None:
             self._session.choose(lambda _: box)
