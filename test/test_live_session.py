@@ -170,6 +170,25 @@ def test_another_target_has_another_id_and_ids_outlive_resets() -> None:
     assert made.track.id == 4
 
 
+def test_who_is_added_again_has_his_id_while_others_are_followed_and_a_new_one_alone() -> None:
+    made, _, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 3)
+    for number, known in ((2, [1, 2]), (1, [1, 2]), (2, [1, 2])):
+        made.remove(number)
+        run(made, 3, 1)
+        made.add(lambda _, box=(FIRST, SECOND)[number - 1].box: box)
+        run(made, 4, 2)
+        assert ids(made) == known
+    made.remove(1)
+    made.remove(2)
+    run(made, 6, 1)
+    made.add(lambda _: FIRST.box)
+    run(made, 7, 2)
+    assert ids(made) == [3]
+
+
 def test_everyone_is_followed_beside_the_chosen_one() -> None:
     made, refused, _ = session()
     made.everyone = True
