@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.live.timeline import StampRepair, Timeline
 from rgbd_kcf_tracker.live.worker import Worker
 from rgbd_kcf_tracker.recordings.camera_info import Camera
 from rgbd_kcf_tracker.ros.diagnostics import NodeState, judge
-from rgbd_kcf_tracker.ros.requests import Requests
+from rgbd_kcf_tracker.ros.requests import Requests, auto_init_fault
 from rgbd_kcf_tracker.variants import DEFAULT_VARIANT, default_parameters
 
 MS = 1_000_000
@@ -490,6 +490,22 @@ def test_images_that_are_passed_over_for_newer_ones_are_an_alarm(
     level, sentence = judge(state, snapshot)
     assert (level != b'\0') == bool(late), sentence
     assert sentence == 'IDLE' or f'{late} images on /color/image came after a newer' in sentence
+
+
+def test_a_range_in_which_nobody_can_be_is_told_for_as_long_as_it_is_asked_for() -> None:
+    settings = NodeParameters(auto_init=True, auto_init_near=2.0, auto_init_far=1.0)
+    assert auto_init_fault(settings.replace(auto_init=False)) == ''
+    assert auto_init_fault(settings.replace(auto_init_near=0.5)) == ''
+    fault = auto_init_fault(settings)
+    state = NodeState('tracker', 'active', publishers=1, auto_init_fault=fault)
+    statistics = Statistics()
+    statistics.image_came()
+    statistics.error('rejected_requests', fault)
+    for ago in (0, 60):  # at first it is the last error, too: said once
+        statistics._error_time -= ago
+        level, sentence = judge(state, statistics.snapshot())
+        assert (level, sentence) == (b'\1', fault)
+    assert 'nobody is between them' in fault
 
 
 def test_ages_are_counted_from_when_the_node_listens_again() -> None:

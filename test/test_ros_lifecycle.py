@@ -295,8 +295,11 @@ def test_a_pair_is_set_in_any_order(rig: Rig) -> None:
             'auto_init_near is 0.5 and auto_init_far 0.4: nobody is between' in said['last_error']
         )
         assert session._auto is None
+        # As long as nobody can be found, that lasts, unlike what went wrong once.
+        assert node._state(node.statistics.snapshot()).auto_init_fault == said['last_error']
         assert set_parameter(rig, 'auto_init_near', 0.2).successful
         rig.wait(lambda: session._auto is not None)
+        assert node._state(node.statistics.snapshot()).auto_init_fault == ''
         assert rig.fresh_values()['rejected_requests'] == '1'
 
 

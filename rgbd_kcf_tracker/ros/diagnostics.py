@@ -35,6 +35,7 @@ class NodeState:
         stale_after: seconds without images that make a silent camera.
         uses_depth: whether the variant wants depth at all.
         depth_fault: why no depth fits, in words; empty where it does.
+        auto_init_fault: why nobody can be chosen by itself, likewise.
         unheard: by input, why one who publishes there is not heard, and what mends it.
     """
 
@@ -49,6 +50,7 @@ class NodeState:
     stale_after: float = 2.0
     uses_depth: bool = True
     depth_fault: str = ''
+    auto_init_fault: str = ''
     unheard: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -62,12 +64,18 @@ def judge(state: NodeState, snapshot: Snapshot) -> tuple[bytes, str]:
     age = snapshot.error_age_s
     error = snapshot.last_error if age is not None and age < RECENT_ERROR_S else ''
     came = max(snapshot.recent.get('color_received', 0), 1)
-    # Images that wait for a depth that never comes are dropped too: the cause is said first.
-    wrong = [error, _without_depth(state, snapshot, came), _dropped(snapshot, came)]
-    wrong += [_late(state, snapshot, came), _frozen(state, snapshot, came)]
+    wrong = [
+        error,
+        state.auto_init_fault,
+        # Images that wait for a depth that never comes are dropped too: the cause is said first.
+        _without_depth(state, snapshot, came),
+        _dropped(snapshot, came),
+        _late(state, snapshot, came),
+        _frozen(state, snapshot, came),
+    ]
     wrong += [why for name, why in state.unheard.items() if name not in (COLOR, DEPTH)]
     if any(wrong):
-        return DiagnosticStatus.WARN, '; '.join(text for text in wrong if text)
+        return DiagnosticStatus.WARN, '; '.join(text for text in dict.fromkeys(wrong) if text)
     return DiagnosticStatus.OK, state.track.name
 
 

@@ -17,11 +17,11 @@ from sensor_msgs.msg import RegionOfInterest
 from std_msgs.msg import UInt32
 from std_srvs.srv import Trigger
 
-from rgbd_kcf_tracker.errors import RgbdKcfError
+from rgbd_kcf_tracker.errors import ParameterError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.live.processor import Processor
 from rgbd_kcf_tracker.live.session import Choice
-from rgbd_kcf_tracker.live.settings import RESTART, NodeParameters, parse_box
+from rgbd_kcf_tracker.live.settings import RESTART, NodeParameters, auto_init_range, parse_box
 from rgbd_kcf_tracker.ros.messages import box_from_roi
 
 if TYPE_CHECKING:
@@ -30,6 +30,17 @@ if TYPE_CHECKING:
 CHOICE = 'choice'
 REJECTED = 'rejected_requests'
 """The kind of fault that a request is which cannot be met."""
+
+
+def auto_init_fault(settings: NodeParameters) -> str:
+    """Why ``auto_init`` finds nobody, in words; empty where it may, or is off."""
+    if not settings.auto_init:
+        return ''
+    try:
+        auto_init_range(settings)
+    except ParameterError as error:
+        return f'auto_init: {error}'
+    return ''
 
 
 class Requests:
@@ -108,10 +119,10 @@ class Requests:
             if settings.auto_init:
                 from rgbd_kcf_tracker.live.auto_init import AutoInit
 
-                try:
+                if fault := auto_init_fault(settings):
+                    self._fault(REJECTED, fault)
+                else:
                     auto = AutoInit(settings)
-                except RgbdKcfError as error:
-                    self._fault(REJECTED, f'auto_init: {error}')
             again = settings.auto_init_again
             self._in_worker('auto_init', lambda: self._session.choose_by_itself(auto, again))
 

@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.ros.diagnostics import NodeState, diagnostics_message
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, ParameterServer
 from rgbd_kcf_tracker.ros.private import release_lifecycle_services
 from rgbd_kcf_tracker.ros.publishers import NO_EVENTS, TrackPublishers
-from rgbd_kcf_tracker.ros.requests import REJECTED, Requests
+from rgbd_kcf_tracker.ros.requests import REJECTED, Requests, auto_init_fault
 from rgbd_kcf_tracker.ros.subscriptions import (
     CAMERA_INFO,
     COLOR,
@@ -441,6 +441,7 @@ class TrackerNode(LifecycleNode):
             stale_after=self._settings.stale_after,
             uses_depth=VARIANTS[session.variant].uses_depth,
             depth_fault=self._intake.fit.fault if self._intake is not None else '',
+            auto_init_fault=auto_init_fault(self._settings),
             unheard=self._unheard_now(snapshot),
         )
 
