@@ -221,6 +221,28 @@ def test_what_was_asked_before_deactivation_is_done(rig: Rig) -> None:
         assert node._session.track.state is TrackState.IDLE
 
 
+def test_a_reset_is_answered_in_every_state(rig: Rig) -> None:
+    """Calls that came while the node was cleaned up were never answered."""
+    with running_node(rig) as node:
+        client = rig.node.create_client(Trigger, '/tracker/reset')
+        assert call(rig, Trigger, '/tracker/reset', Trigger.Request()).success
+        assert change(rig, Transition.TRANSITION_DEACTIVATE)
+        assert client.wait_for_service(20)
+        take_down = node._take_down
+
+        def slowly() -> None:
+            answers.extend(client.call_async(Trigger.Request()) for _ in range(5))
+            time.sleep(0.3)  # they arrive meanwhile
+            take_down()
+
+        answers: list[Any] = []
+        node._take_down = slowly
+        assert change(rig, Transition.TRANSITION_CLEANUP)
+        rig.wait(lambda: all(answer.done() for answer in answers), 20, 'an answer to each')
+        assert {answer.result().success for answer in answers} == {False}
+        assert answers[0].result().message == 'the node is unconfigured: it has no target'
+
+
 def test_nothing_of_a_destroyed_node_is_found(rig: Rig) -> None:
     # What is left of one hides the services of the next of that name from whoever asks for them.
     with running_node(rig) as node:

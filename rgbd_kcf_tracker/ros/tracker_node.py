@@ -89,7 +89,6 @@ class TrackerNode(LifecycleNode):
         self._intake: Intake | None = None
         self._inputs: Subscriptions | None = None
         self._transforms: Transforms | None = None
-        self._reset_service: Any = None
         self._refusals = Allowance(MOST_REFUSALS, REFUSALS_A_SECOND)
         self._logged: dict[str, float] = {}
         self._topics: dict[str, str] = {}
@@ -112,7 +111,8 @@ class TrackerNode(LifecycleNode):
         )
         self._poll_timer = self.create_timer(POLL_PERIOD_S, self._poll, clock=steady)
         self._poll_timer.cancel()
-
+        # In every state, too: a call that waits while its service goes never has an answer.
+        self.create_service(Trigger, '~/reset', self._reset)
         self._answer_impossible_transitions()
 
     def _answer_impossible_transitions(self) -> None:
@@ -184,7 +184,6 @@ class TrackerNode(LifecycleNode):
             self._requests = Requests(
                 self._processor, lambda: self._settings, self._in_worker, self._fault
             )
-            self._reset_service = self.create_service(Trigger, '~/reset', self._requests.reset)
             self._requests.from_parameters(frozenset({'init_box', 'auto_init'}))
         except Exception as error:  # rclpy would hide it
             self._cannot(f'cannot configure: {_first_line(error)}')
@@ -284,9 +283,6 @@ class TrackerNode(LifecycleNode):
         if self._transforms is not None:
             self._transforms.destroy()
             self._transforms = None
-        if self._reset_service is not None:
-            self.destroy_service(self._reset_service)
-            self._reset_service = None
         # A worker that is still busy keeps the session that it has; the next one is another.
         self._session = self._processor = self._requests = self._worker = None
 
@@ -349,6 +345,13 @@ class TrackerNode(LifecycleNode):
         if session is not None and 'max_targets' in names:
             most = self._settings.max_targets
             self._in_worker('most', lambda: setattr(session, 'most', most))
+
+    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._requests is not None:
+            return self._requests.reset(request, response)
+        response.success = False
+        response.message = f'the node is {self._lifecycle()}: it has no target'
+        return response
 
     def _in_worker(self, kind: str, function: Callable[[], None]) -> None:
         if self._worker is not None:
