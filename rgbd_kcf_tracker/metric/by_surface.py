@@ -384,7 +384,7 @@ class BySurface:
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
         fraction = placed.fraction
-        if not stands and claim.mine > 0 and has_come(scene, seen):
+        if not stands and claim.mine > 0 and self._has_fallen(scene, seen, account.time):
             # He falls as fast as nobody walks, and shows less, seen along his body.
             away[1] = 0.0
             fraction = max(fraction, min(1.0, fraction / END_ON))
@@ -422,6 +422,17 @@ class BySurface:
             more=more,
         )
         return Candidate(seen, placed, evidence, probability(evidence))
+
+    def _has_fallen(self, scene: Scene, seen: Silhouette, time: float) -> bool:
+        """Whether what is too low for one who stands has come there, and is no leg of his.
+
+        That shows last of who walks out at the side.
+        """
+        ends, last = seen.ends(scene.view, scene.rim), self.person.last
+        if ends.left or ends.right:
+            lay = last is not None and self.person.lies(scene.top(last), time)
+            return lay and has_come(scene, seen)
+        return has_come(scene, seen)
 
     def _came_in(self, account: Account, seen: Silhouette) -> bool:
         """Whether a candidate is at the edge of what the camera sees, or came in there."""
