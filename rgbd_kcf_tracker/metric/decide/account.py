@@ -301,8 +301,9 @@ class Account:
         last = person.last
         if person.mobile or share == 0:
             return share
-        if last is None:
-            return 0.0
+        # What was never a figure may have been taken for what stands there.
+        if last is None or not person.figure:
+            return share if person.travelled > TRAVELLED else 0.0
         # What the outline of the last sight holds, about as deep, may have been the person.
         there, depth = (last.rows, last.cols), self.scene.view.depth
         step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)

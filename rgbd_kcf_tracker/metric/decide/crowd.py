@@ -251,7 +251,7 @@ class Crowd:
             other = self.welcome(person.place, since)
         person.exchange(other, since)
         for each in self.people:  # who came after that was seen beside the other alone
-            if each.first_seen >= since and each.number in person.met:
+            if each is not other and each.first_seen >= since and each.number in person.met:
                 each.met.discard(person.number)
                 person.met.discard(each.number)
                 each.meet(other)

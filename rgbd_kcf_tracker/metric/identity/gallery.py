@@ -409,6 +409,13 @@ class _Learned:
     time: float
     trust: float = math.inf
 
+    def says_more(self, other: _Learned) -> bool:
+        """Whether it says more than one of the same look: surer, or of all of him, not a part."""
+        if self.trust < other.trust:
+            return False
+        all_of_him = self.view.total >= WHOLE_AREA > other.view.total
+        return all_of_him or self.trust > other.trust + SURER
+
 
 class Gallery:
     """The views by which one is known, and the height of the head.
@@ -487,7 +494,7 @@ class Gallery:
         self._set_tops([*self._tops, (time, top)])
 
     def learn(self, view: View, time: float, trust: float = math.inf) -> None:
-        """Take a view of this person, where it shows something new or shows it more surely.
+        """Take a view of this person, where it shows something new, more of it, or more surely.
 
         Args:
             view: the view.
@@ -501,7 +508,7 @@ class Gallery:
         if self.looks is not None:
             alike = similarity(new.view, self.looks) > NOVEL
             twins = [each for each, is_twin in zip(learned, alike.tolist(), strict=True) if is_twin]
-            if any(each.trust >= new.trust - SURER for each in twins):
+            if not all(new.says_more(each) for each in twins):
                 return
             learned = [each for each in learned if each not in twins]
             if len(learned) >= MOST_VIEWS:

@@ -185,7 +185,7 @@ class Room:
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
         self._front = np.where(somebody, depth, np.float32(0))
         self._stood, self._stood_at = np.zeros_like(depth), np.zeros_like(depth)
-        self._time = 0.0
+        self._time = self._unlearned = 0.0
 
     def open(self, somebody: Mask, depth: DepthArray) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody.
