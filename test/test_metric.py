@@ -15,11 +15,13 @@ import cv2
 import numpy as np
 import pytest
 from people_rig import BLACK, CAMERA, COLS, DARK_RED, RED, ROWS, WALL, Someone, images
+from people_rig import picture as people_picture
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, depth_in
 from rgbd_kcf_tracker.metric.drawn import UNLIKE
+from rgbd_kcf_tracker.metric.gated_look import Gated, GatedLook
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 from rgbd_kcf_tracker.simulation import SimulatedFrame, simulate
@@ -273,6 +275,47 @@ def test_depth_that_comes_and_goes():
         return Frame(frame.color, None if dark else frame.depth, frame.stamp_ns, frame.intrinsics)
 
     assert follow(scene('normal'), flicker).success > 0.8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('name', 'seed'), [('clutter', 1), ('normal', 2), ('recede', 2)])
+def test_a_target_whose_depth_fails_for_good_is_followed_by_its_look(name: str, seed: int):
+    """It was lost in full view, where on colour alone from the start it was not."""
+    samples = list(simulate(name, seed=seed, size=(320, 240)))
+    dark, tracker, seen = len(samples) // 3, create_tracker('metric'), []
+    for index, sample in enumerate(samples):
+        frame = sample.frame
+        if index >= dark:
+            frame = dataclasses.replace(frame, depth=None)
+        if index == 0:
+            assert sample.truth.visible is not None
+            track = tracker.start(frame, sample.truth.visible)
+        else:
+            track = tracker.update(frame)
+        if index >= dark and sample.truth.visible is not None:
+            assert track.box is None or track.score <= 0.8, 'nothing bears it out'
+            seen.append(track.box is not None and track.box.iou(sample.truth.visible) > 0.5)
+    assert np.mean(seen) > 0.8
+
+
+@pytest.mark.parametrize(('at', 'told'), [(0, False), (30, True)])
+def test_the_wall_where_a_target_was_before_depth_failed_is_not_it(
+    at: int, told: bool, monkeypatch: pytest.MonkeyPatch
+):
+    """Its colours had wandered on to the wall, at 0.9 for the rest of the recording."""
+
+    def one(i: int) -> Someone:
+        return Someone(-1.2 + 0.06 * i, 2.6)
+
+    found = Gated(Look(one(at).box, 1.0, 1.0, None), 0.0, None)
+    monkeypatch.setattr(GatedLook, 'step', lambda *_: found)
+    tracker = create_tracker('metric')
+    for i in range(31):
+        frame = people_picture([one(i)], 0.1 * i)
+        if i == 30:
+            frame = dataclasses.replace(frame, depth=None)
+        track = tracker.start(frame, one(i).box) if i == 0 else tracker.update(frame)
+    assert (track.box is not None) == told
 
 
 def test_what_somebody_has_left_whom_it_was_one_figure_with_is_nobody_as_it_does_not_stir():

@@ -22,6 +22,7 @@ from rgbd_kcf_tracker.insight import insight_in
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.crowd import MOST_PEOPLE
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.targets import MetricTargets, MetricTracker
@@ -1043,8 +1044,33 @@ def test_how_high_a_newcomer_may_be_is_told_in_the_pixels_of_the_image(times: in
         targets.update(larger(picture([one], 0.0), size))
         assert targets.metric is not None
         accounts.append(dataclasses.replace(targets.metric.account, time=1.0))
-    newcomers = Newcomers(accounts[0], one.box, 0.0)
+    newcomers = Newcomers(accounts[0], one.box, 0.0, frozenset())
     assert newcomers._grown(accounts[1]) == pytest.approx(times * newcomers._grown(accounts[0]))
+
+
+@pytest.mark.parametrize('about', [True, False])
+def test_of_whom_something_was_in_the_box_is_not_refused_as_one_who_was_there(about: bool):
+    """Nothing else had been seen before the box was drawn, so that he was where it mattered not."""
+    person = Person(3, np.zeros(2), 0.0)
+    newcomers = Newcomers(None, left(0).box, 1.0, frozenset({3} if about else ()))
+    assert newcomers.was_there(person) == (not about)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('name', 'rate', 'at', 'who'), [('group_crossing', 5.0, 12, 3), ('lookaround', 1.0, 7, 3)]
+)
+def test_what_sticks_out_of_a_box_sideways_is_not_what_it_is_about(name, rate, at, who):
+    """Half a person and the chair that he touches, and a stranger, told at 0.94 and 0.98."""
+    seed = 2003 if name == 'group_crossing' else 2004
+    *_, drawn, after = islice(simulate(name, seed=seed, rate_hz=rate, size=(480, 270)), at + 2)
+    targets = TargetSet('metric')
+    number = targets.add(drawn.frame, drawn.truths[who].shown)
+    about = drawn.truths[who].shown
+    assert about.x < targets.started(number).box.cx < about.right
+    box = targets.update(after.frame)[number].box
+    others = [t.shown for n, t in after.truths.items() if n != who and t.shown is not None]
+    assert box is None or all(box.iou(other) < 0.3 for other in others)
 
 
 def test_frames_without_depth_are_no_misses():

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,6 +38,7 @@ from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.identity.tally import logit
 from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, fits, surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
+from rgbd_kcf_tracker.metric.perceive.colors import view_image
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import depth_step
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -73,6 +75,12 @@ somebody who touches it."""
 LEAST_KNOWN = 0.2
 """Share of a box that a surface fills, at the least, to be known by it where depth's view ends:
 half a person fills a quarter, and by an arm and a leg nobody is known again."""
+IN_THE_DARK = 0.8
+"""Score of a target whose depth fails, at the most: of four boxes by colours alone three were right
+when depth did not come back (docs/experiments.md)."""
+SOUGHT = 0.5
+"""Seconds for which a target that gets out of sight while depth fails is sought by its colours
+alone: some frames at 5 Hz. Later he may have left, and somebody else is like him."""
 SOON = 0.25
 """Seconds after which nobody is where a box was drawn about him: at a walk (1.4 m/s) he is half a
 body farther."""
@@ -141,6 +149,9 @@ class Follower:
         self._drawn = box
         self._look: ByLook | None = None
         self._gated: GatedLook | None = None
+        # By which a target is followed while depth fails that is followed by its surface else.
+        self._dark: GatedLook | None = None
+        self._frame = frame
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
             if self._surface is None:
@@ -167,6 +178,8 @@ class Follower:
         """Do what no answer waits for; after each :meth:`step`, before the next."""
         if self._look is not None:
             self._look.settle()
+        if self._dark is not None:
+            self._dark.settle()
 
     def lose(self, gone: float) -> None:
         """Who was followed is not the target, which has been away for ``gone`` seconds."""
@@ -177,8 +190,8 @@ class Follower:
 
     @property
     def by_look(self) -> bool:
-        """Whether it is followed by its look, as depth has not told it from the rest."""
-        return self._surface is None
+        """Whether it is followed by its look, as depth does not tell it from the rest."""
+        return self._surface is None or self._dark is not None
 
     def step(
         self, frame: Frame, account: Account | None, view: DepthView | None, dt: float, turn: bool
@@ -202,11 +215,11 @@ class Follower:
         if self._surface is None:
             track = self._by_look(frame, account, dt, turn)
         else:
-            track = self._by_surface(frame, account, view, dt, self._surface)
+            track = self._by_surface(frame, account, view, dt, turn, self._surface)
         self.response = None if self._look is None else self._look.response
         self._hidden_for = 0.0 if track.box is not None else self._hidden_for + dt
         self._unread_for = 0.0 if track.depth is not None else self._unread_for + dt
-        self.track = track
+        self.track, self._frame = track, frame
         return track
 
     # -- by surface -------------------------------------------------------------------------------
@@ -265,11 +278,13 @@ class Follower:
         account: Account | None,
         view: DepthView | None,
         dt: float,
+        turn: bool,
         surface: BySurface,
     ) -> Track:
         if account is None:
             surface.drift(dt)
-            return self._glance(frame, None, view, dt, surface)
+            return self._in_the_dark(frame, view, dt, turn, surface)
+        self._dark = None
         found = surface.step(account, frame, dt)
         if found is not None and self._passes(account, surface, found):
             found = None
@@ -430,6 +445,30 @@ class Follower:
         self.seen = whole
         return self._surface
 
+    def _in_the_dark(
+        self, frame: Frame, view: DepthView | None, dt: float, turn: bool, surface: BySurface
+    ) -> Track:
+        """Go on by the look while depth fails, from where the target was found last."""
+        last = self.track.box
+        if self._dark is None and self._look is not None and last is not None:
+            look = ByLook(replace(self._frame, depth=None), last, self._parameters)
+            self._dark = GatedLook(look, None, last, self._since, self._parameters.seen_ratio)
+        # Whom nothing but colours tell is not sought for long: he is soon anybody alike.
+        turn = turn and self._hidden_for < SOUGHT
+        said = None if self._dark is None else self._dark.step(frame, None, dt, turn)
+        if said is None or said.look is None:
+            return self._glance(frame, None, view, dt, surface)
+        if view is not None:
+            if self._stood_there(frame, None, view, surface.person, said.look.box):
+                self._dark = None
+                surface.miss(None, dt)
+                return self._hidden(frame, dt)
+            surface.seen_elsewhere(view, said.look.box)
+        known = self._unread_for + dt <= self._parameters.predict_for
+        belief = surface.belief() if known else None
+        score = min(_score(said.look, 0.0), IN_THE_DARK)
+        return self._told(frame, said.look.box, score, None, belief)
+
     def _glance(
         self,
         frame: Frame,
@@ -455,7 +494,7 @@ class Follower:
                 if (
                     look is not None
                     and stood >= ELSEWHERE
-                    and not self._stood_there(account, surface.person, look.box)
+                    and not self._stood_there(frame, account, view, surface.person, look.box)
                     and not self._unlike(account, surface, look)
                 ):
                     surface.seen_elsewhere(view, look.box)
@@ -470,14 +509,14 @@ class Follower:
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
-    def _stood_there(self, account: Account | None, person: Person, box: Box) -> bool:
+    def _stood_there(
+        self, frame: Frame, account: Account | None, view: DepthView, person: Person, box: Box
+    ) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""
-        if account is None:
-            return False
-        scene = account.scene
-        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
-            person.mobile and room_share(account, box) > IS_ROOM
-        )
+        image = view_image(frame.color, view.step) if account is None else account.scene.image
+        if self._elsewhere.unchanged(image, box.over(view.step)):
+            return True
+        return account is not None and person.mobile and room_share(account, box) > IS_ROOM
 
     def _unlike(self, account: Account | None, surface: BySurface, look: Look) -> bool:
         """Whether what the look has found looks unlike the person who is followed."""

@@ -90,12 +90,12 @@ class GatedLook:
     def __init__(
         self, look: ByLook, account: Account | None, box: Box, since: float, seen_ratio: float
     ) -> None:
-        self._look, self._since, self._seen_ratio = look, since, seen_ratio
-        self._newcomers = Newcomers(account, box, since)
+        self._look, self._seen_ratio = look, seen_ratio
+        about = frozenset[int]() if account is None else _people_about(account, box)
+        self._newcomers = Newcomers(account, box, since, about)
         self._agreed, self._unseen = 0, 0.0
         self._mobile = self._carried = False
         self._began: tuple[tuple[slice, slice], DepthArray] | None = None
-        self._people: frozenset[int] = frozenset()
         self._last: Box | None = box
         self._at: FloatArray | None = None
         self.stood: Stood | None = None
@@ -106,7 +106,6 @@ class GatedLook:
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             part = _part(account.scene, box)
             self._began = part, account.scene.view.depth[part].copy()
-            self._people = _people_about(account, box)
             at = _place(account.scene.view, Look(box, 1.0, 0.0, look.last_depth))
             if look.last_depth is not None and at is not None:
                 self.stood, self._at = Stood(*at), at[0]
@@ -118,8 +117,8 @@ class GatedLook:
 
     def others(self, account: Account) -> set[int]:
         """Numbers of those who were there before the target was chosen, or seen beside it."""
-        before = {p.number for p in account.people if p.first_seen <= self._since}
-        return (before - self._people) | self._newcomers.beside
+        before = {p.number for p in account.people if self._newcomers.was_there(p)}
+        return before | self._newcomers.beside
 
     def step(self, frame: Frame, account: Account | None, dt: float, turn: bool) -> Gated:
         """Look for the target in the next ``frame``, ``dt`` seconds later.
@@ -165,6 +164,10 @@ class GatedLook:
         elif account is not None and in_time:
             onto = self._onto(account, look, dt)
         return Gated(look, stood, onto)
+
+    def settle(self) -> None:
+        """Learn what no answer waits for; after each :meth:`step`, before the next."""
+        self._look.settle()
 
     def _carry(self, scene: Scene) -> Box | None:
         """Where the target was found last, as the image shows that place now."""
@@ -272,9 +275,8 @@ class GatedLook:
         owner = account.owner_of(index)
         if owner is None:
             return False
-        before = owner.first_seen <= self._since and owner.number not in self._people
         beside = owner.chosen or owner.number in self._newcomers.beside
-        return before or (drawn is not None and beside)
+        return self._newcomers.was_there(owner) or (drawn is not None and beside)
 
     def _of_another(self, account: Account, whole: Silhouette) -> bool:
         """Whether a figure is another target."""

@@ -17,6 +17,7 @@ from rgbd_kcf_tracker.metric.decide.account import STATURE, Account
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.drawn import Drawn
+from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Sides
 
@@ -50,16 +51,23 @@ class Newcomers:
         account: of the frame in which the target was chosen; None where that has no depth.
         box: the target in it.
         since: seconds of that frame.
+        about: numbers of those of whom something showed in the box: it may be any of them.
 
     Attributes:
         beside: numbers of those who were seen beside it.
     """
 
-    def __init__(self, account: Account | None, box: Box, since: float) -> None:
-        self._since, self._height = since, box.height
+    def __init__(
+        self, account: Account | None, box: Box, since: float, about: frozenset[int]
+    ) -> None:
+        self._since, self._height, self._about = since, box.height, about
         self._pixels = None if account is None else _pixels(account.scene)
         self.beside: set[int] = set()
         self._ends: Sides | None = None if account is None else account.scene.ends(box)
+
+    def was_there(self, person: Person) -> bool:
+        """Whether somebody was there before the target was chosen, and is not the target."""
+        return person.first_seen <= self._since and person.number not in self._about
 
     def keep(self, account: Account, box: Box) -> None:
         """Take where the target is: all who show beside it are others, whoever passes it later."""
@@ -99,9 +107,7 @@ class Newcomers:
             person = account.owner_of(column)
             if person is not None and person.chosen:  # another target
                 continue
-            met = person is not None and (
-                person.first_seen <= self._since or person.number in self.beside
-            )
+            met = person is not None and (self.was_there(person) or person.number in self.beside)
             if met and account.looks[row, column] > 0:
                 continue
             if sight.figure.parted:  # where it ends is a guess
