@@ -20,6 +20,7 @@ from people_rig import picture as people_picture
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TargetSet, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ParameterError
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look, depth_in
+from rgbd_kcf_tracker.metric.dark import Dark
 from rgbd_kcf_tracker.metric.drawn import UNLIKE
 from rgbd_kcf_tracker.metric.gated_look import Gated, GatedLook
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
@@ -296,6 +297,42 @@ def test_a_target_whose_depth_fails_for_good_is_followed_by_its_look(name: str, 
             assert track.box is None or track.score <= 0.8, 'nothing bears it out'
             seen.append(track.box is not None and track.box.iou(sample.truth.visible) > 0.5)
     assert np.mean(seen) > 0.8
+
+
+def test_who_stops_while_depth_fails_is_at_once_himself_where_it_returns():
+    """He went on as he came, and was behind the camera by then, and hardly he from then on."""
+    tracker, tracks = create_tracker('metric'), []
+    for i in range(75):
+        one = Someone(0.0, 3.6 - 0.1 * min(i, 16))
+        frame = people_picture([one], 0.1 * i)
+        if 16 <= i < 65:
+            frame = dataclasses.replace(frame, depth=None)
+        tracks.append(tracker.update(frame) if tracks else tracker.start(frame, one.box))
+        if i >= 16:
+            assert tracks[-1].box is not None, i
+            assert tracks[-1].box.iou(one.box) > 0.7, i
+    assert tracks[-1].score > 0.95
+
+
+def test_nothing_goes_on_in_the_dark_from_one_who_may_be_another_nor_for_long_out_of_sight():
+    one, dark = Someone(0.0, 2.6), Dark(0.0, MetricParameters())
+    frame, empty = (people_picture(people, 0.0) for people in ([one], []))
+    assert dark.step(empty, 0.1, True) is None
+    dark.seen(frame, one.box, 2.6, 0.6)
+    assert dark.ready
+    assert dark.step(frame, 0.1, False) is None, 'it costs a turn to begin'
+    look = dark.step(frame, 0.1, True)
+    assert look is not None
+    assert look.box.iou(one.box) > 0.9
+    assert dark.depth(look.box.scaled(2)) == pytest.approx(1.3, rel=0.05)
+    assert dark.most == 0.6, 'what it was; nothing has borne it out'
+    assert [dark.step(empty, 0.2, True) for _ in range(3)] == [None] * 3
+    assert not dark.runs
+    assert not dark.ready
+    dark.seen(frame, one.box, 2.6, 0.99)
+    assert dark.most == 0.8
+    dark.forget()
+    assert dark.step(frame, 0.1, True) is None
 
 
 @pytest.mark.parametrize(('at', 'told'), [(0, False), (30, True)])

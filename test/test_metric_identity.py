@@ -359,6 +359,10 @@ def test_a_view_of_all_of_him_takes_the_place_of_a_part_that_looks_the_same():
     gallery = Gallery.of(all_of_him, 0.0)
     gallery.learn(part, 1.0)
     assert gallery.views == [all_of_him]
+    gallery = Gallery.of(part, 0.0)
+    gallery.learn(all_of_him, 5.0)
+    assert gallery.taken_back(4.0).views == [all_of_him]
+    assert gallery.views == [part], 'it had nothing but what was another'
 
 
 def test_a_copy_of_a_gallery_learns_for_itself():
@@ -1348,23 +1352,6 @@ def test_a_chosen_one_comes_back_as_a_stranger_who_resembles_him():
         assert resemblance is not None
         assert (resemblance > 1) == same
         watched.wait(3)
-
-
-@pytest.mark.parametrize(
-    ('figure', 'travelled', 'share'), [(False, 1.0, 1.0), (False, 0.0, 0.0), (True, 1.0, 0.0)]
-)
-def test_what_walks_and_is_no_figure_is_not_excused_from_being_the_room(figure, travelled, share):
-    """A dog that had once been taken for furniture was that to the end, at 0.99."""
-    watched = Watched()
-    watched.walk(-1.0, 0.6, 3.0, RED)
-    account = watched.see(Someone(0.6, 3.0, RED))
-    wall = Silhouette.trimmed(account.scene.view, 5, 5, np.ones((20, 10), np.bool_), Rim())
-    assert wall is not None
-    assert account.room_share(wall) == 1.0
-    person = Person(9, np.zeros(2), 0.0)
-    person.figure, person.last, person.seen_at = figure, wall, account.time
-    person.travelled = travelled
-    assert account._room_beside(person, wall) == share
 
 
 def test_who_comes_back_is_explained_as_himself_from_the_first_sight_on_and_others_are_not():

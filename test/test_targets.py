@@ -1056,23 +1056,6 @@ def test_of_whom_something_was_in_the_box_is_not_refused_as_one_who_was_there(ab
     assert newcomers.was_there(person) == (not about)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ('name', 'rate', 'at', 'who'), [('group_crossing', 5.0, 12, 3), ('lookaround', 1.0, 7, 3)]
-)
-def test_what_sticks_out_of_a_box_sideways_is_not_what_it_is_about(name, rate, at, who):
-    """Half a person and the chair that he touches, and a stranger, told at 0.94 and 0.98."""
-    seed = 2003 if name == 'group_crossing' else 2004
-    *_, drawn, after = islice(simulate(name, seed=seed, rate_hz=rate, size=(480, 270)), at + 2)
-    targets = TargetSet('metric')
-    number = targets.add(drawn.frame, drawn.truths[who].shown)
-    about = drawn.truths[who].shown
-    assert about.x < targets.started(number).box.cx < about.right
-    box = targets.update(after.frame)[number].box
-    others = [t.shown for n, t in after.truths.items() if n != who and t.shown is not None]
-    assert box is None or all(box.iou(other) < 0.3 for other in others)
-
-
 def test_frames_without_depth_are_no_misses():
     """Nothing is looked for in them: who was followed all along had been away."""
     tracker = create_tracker('metric', MetricParameters(use_look=False))

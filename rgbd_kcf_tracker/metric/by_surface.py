@@ -67,6 +67,11 @@ a third, a side view or what hides him smaller by as much."""
 PLACED_MIDDLE = 0.4
 """Share of the body's height from its upper end down to where the camera must see past a particle:
 the belly, which is broad and which a table hides less often than legs."""
+BY_SIZE = 0.2
+"""Share of a depth that is told by the size of a box by which it is unsure: two steps of the filter
+over scale, or a side that something hides."""
+ANY_HEIGHT = np.array([0.0, 10.0, 0.0])
+"""Metres by which a place is unsure where its height tells nothing."""
 END_ON = 0.25
 """Share of a body that shows of one who lies, seen along his body: his breadth by his depth."""
 LEARN_FRACTION = 0.6
@@ -141,6 +146,7 @@ class BySurface:
         self._rng = np.random.default_rng(parameters.seed)
         self.hidden_for = self._gone = 0.0
         self._misses, self.was_away = 0, False
+        self._lay = False
         self.contested = 0.0
         self.candidates: list[Candidate] = []
         self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
@@ -261,6 +267,7 @@ class BySurface:
         self.hidden_for = self._gone = 0.0
         self._misses = 0
         seen, placed = found.seen, found.placed
+        self._lay = not self.person.gallery.stands(scene.top(seen))
         self.motion.correct(placed.position, placed.sigma)
         if not seen.cut.any:
             self._stood.seen(placed.position, placed.sigma, self._dt)
@@ -284,9 +291,15 @@ class BySurface:
         self._misses += scene is not None
         self.motion.velocity = self.motion.velocity * np.exp(-dt / SLOWING)
 
-    def seen_elsewhere(self, view: DepthView, box: Box) -> None:
-        """Take a box of the image that was found by other means: it tells all but the depth."""
-        place, sigma = self._at(view, box)
+    def seen_elsewhere(self, view: DepthView, box: Box, depth: float | None = None) -> None:
+        """Take a box of the image that was found by other means.
+
+        Args:
+            view: the last depth.
+            box: in pixels of the image.
+            depth: metres, as its size tells; None where it tells all but the depth.
+        """
+        place, sigma = self._at(view, box, depth)
         self.motion.correct(place, sigma)
         self._middle.placed(place, sigma)
         self.hidden_for = self._gone = 0.0
@@ -307,11 +320,13 @@ class BySurface:
         """Log-odds, by where it stood, that the target is in a box of the image."""
         return self._stood.log_odds(*self._at(view, box))
 
-    def _at(self, view: DepthView, box: Box) -> tuple[FloatArray, FloatArray]:
+    def _at(
+        self, view: DepthView, box: Box, depth: float | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Where the target would be in a box of the image, and how surely, ``(3,)`` metres each."""
-        z = float(self.motion.position[2])
+        z = float(self.motion.position[2]) if depth is None else depth
         place = view.metres(box.cx / view.step, box.y / view.step, z)
-        return np.array(place), np.array([0.1, 0.1, 10.0])
+        return np.array(place), np.array([0.1, 0.1, 10.0 if depth is None else BY_SIZE * depth])
 
     # -- parts ------------------------------------------------------------------------------------
 
@@ -383,13 +398,15 @@ class BySurface:
         placed = body.place(seen, scene.codes, scene.view, motion.position, sigma, stands)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
+        unsure = placed.sigma
         fraction = placed.fraction
-        if not stands and claim.mine > 0 and self._has_fallen(scene, seen, account.time):
+        mine = claim.mine if self._parameters.use_others else 0.0
+        if not stands and mine > 0 and self._has_fallen(scene, seen):
             # He falls as fast as nobody walks, and shows less, seen along his body.
-            away[1] = 0.0
+            away[1], unsure = 0.0, placed.sigma + ANY_HEIGHT
             fraction = max(fraction, min(1.0, fraction / END_ON))
         if self._cloud is not None:
-            step = self._cloud.distance(placed.position, placed.sigma)
+            step = self._cloud.distance(placed.position, unsure)
         else:
             step = float((away / variance).sum())
         at_will = (STRIDE + STRIDE_PER_SECOND * dt) ** 2
@@ -415,7 +432,7 @@ class BySurface:
             inland=0.0 if came_in else self._gone,
             emerged=not came_in,
             look=claim.look if self._parameters.use_color else 0.0,
-            mine=claim.mine if self._parameters.use_others else 0.0,
+            mine=mine,
             rival=claim.rival if self._parameters.use_others else 0.0,
             assigned=claim.assigned if self._parameters.use_others else 0,
             room=claim.room if self._parameters.use_room else 0.0,
@@ -423,16 +440,14 @@ class BySurface:
         )
         return Candidate(seen, placed, evidence, probability(evidence))
 
-    def _has_fallen(self, scene: Scene, seen: Silhouette, time: float) -> bool:
-        """Whether what is too low for one who stands has come there, and is no leg of his.
+    def _has_fallen(self, scene: Scene, seen: Silhouette) -> bool:
+        """Whether what is too low for one who stands has come there.
 
-        That shows last of who walks out at the side.
+        At the image's side a leg is the last that shows of who walks out: there he must have lain
+        in the frame before.
         """
-        ends, last = seen.ends(scene.view, scene.rim), self.person.last
-        if ends.left or ends.right:
-            lay = last is not None and self.person.lies(scene.top(last), time)
-            return lay and has_come(scene, seen)
-        return has_come(scene, seen)
+        ends = seen.ends(scene.view, scene.rim)
+        return (self._lay or not (ends.left or ends.right)) and has_come(scene, seen)
 
     def _came_in(self, account: Account, seen: Silhouette) -> bool:
         """Whether a candidate is at the edge of what the camera sees, or came in there."""

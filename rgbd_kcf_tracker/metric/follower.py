@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
+from rgbd_kcf_tracker.metric.dark import Dark
 from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account
 from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
@@ -75,12 +75,6 @@ somebody who touches it."""
 LEAST_KNOWN = 0.2
 """Share of a box that a surface fills, at the least, to be known by it where depth's view ends:
 half a person fills a quarter, and by an arm and a leg nobody is known again."""
-IN_THE_DARK = 0.8
-"""Score of a target whose depth fails, at the most: of four boxes by colours alone three were right
-when depth did not come back (docs/experiments.md)."""
-SOUGHT = 0.5
-"""Seconds for which a target that gets out of sight while depth fails is sought by its colours
-alone: some frames at 5 Hz. Later he may have left, and somebody else is like him."""
 SOON = 0.25
 """Seconds after which nobody is where a box was drawn about him: at a walk (1.4 m/s) he is half a
 body farther."""
@@ -138,6 +132,7 @@ class Follower:
         self._partial, self._shown = False, 0.0
         self._since = crowd.time
         self._elsewhere = Elsewhere()
+        self._dark = Dark(crowd.time, parameters)
         self._comeback: Comeback | None = None
         self.person: Person | None = None
         self.seen: Silhouette | None = None
@@ -149,9 +144,6 @@ class Follower:
         self._drawn = box
         self._look: ByLook | None = None
         self._gated: GatedLook | None = None
-        # By which a target is followed while depth fails that is followed by its surface else.
-        self._dark: GatedLook | None = None
-        self._frame = frame
         if parameters.use_look or self._surface is None:
             self._look = ByLook(frame, box, parameters)
             if self._surface is None:
@@ -162,6 +154,8 @@ class Follower:
                 self._know_as_drawn(account, box, self._look)
         depth = None if self.seen is None else self.seen.depth
         belief = None if self._surface is None else self._surface.belief()
+        if account is not None and depth is not None:
+            self._dark.seen(frame, box, depth, 1.0)
         self.first = self.track = self._told(frame, box, 1.0, depth, belief)
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
@@ -178,8 +172,7 @@ class Follower:
         """Do what no answer waits for; after each :meth:`step`, before the next."""
         if self._look is not None:
             self._look.settle()
-        if self._dark is not None:
-            self._dark.settle()
+        self._dark.settle()
 
     def lose(self, gone: float) -> None:
         """Who was followed is not the target, which has been away for ``gone`` seconds."""
@@ -188,10 +181,9 @@ class Follower:
             self._surface.disown(gone)
         self._comeback = None
 
-    @property
-    def by_look(self) -> bool:
-        """Whether it is followed by its look, as depth does not tell it from the rest."""
-        return self._surface is None or self._dark is not None
+    def by_look(self, depth: bool) -> bool:
+        """Whether it is followed by its look in a frame with or without ``depth``."""
+        return self._surface is None or (not depth and self._dark.ready)
 
     def step(
         self, frame: Frame, account: Account | None, view: DepthView | None, dt: float, turn: bool
@@ -217,9 +209,11 @@ class Follower:
         else:
             track = self._by_surface(frame, account, view, dt, turn, self._surface)
         self.response = None if self._look is None else self._look.response
+        if account is None and self._dark.runs:
+            self.response = self._dark.response
         self._hidden_for = 0.0 if track.box is not None else self._hidden_for + dt
         self._unread_for = 0.0 if track.depth is not None else self._unread_for + dt
-        self.track, self._frame = track, frame
+        self.track = track
         return track
 
     # -- by surface -------------------------------------------------------------------------------
@@ -284,7 +278,7 @@ class Follower:
         if account is None:
             surface.drift(dt)
             return self._in_the_dark(frame, view, dt, turn, surface)
-        self._dark = None
+        self._dark.forget()
         found = surface.step(account, frame, dt)
         if found is not None and self._passes(account, surface, found):
             found = None
@@ -319,6 +313,7 @@ class Follower:
                 cue.learn(frame, box, surface.person.number)
             if self._look is not None and not found.seen.cut.any:
                 self._look.attend(frame, box, dt, ATTEND)
+        self._dark.seen(frame, box, found.seen.depth, score)
         return self._told(frame, box, score, found.seen.depth, surface.belief())
 
     def _passes(self, account: Account, surface: BySurface, found: Candidate) -> bool:
@@ -448,26 +443,30 @@ class Follower:
     def _in_the_dark(
         self, frame: Frame, view: DepthView | None, dt: float, turn: bool, surface: BySurface
     ) -> Track:
-        """Go on by the look while depth fails, from where the target was found last."""
-        last = self.track.box
-        if self._dark is None and self._look is not None and last is not None:
-            look = ByLook(replace(self._frame, depth=None), last, self._parameters)
-            self._dark = GatedLook(look, None, last, self._since, self._parameters.seen_ratio)
-        # Whom nothing but colours tell is not sought for long: he is soon anybody alike.
-        turn = turn and self._hidden_for < SOUGHT
-        said = None if self._dark is None else self._dark.step(frame, None, dt, turn)
-        if said is None or said.look is None:
+        """Go on by the look while depth fails, from where depth showed the target last."""
+        look = self._dark.step(frame, dt, turn) if self._look is not None else None
+        if look is None and not self._dark.runs:
             return self._glance(frame, None, view, dt, surface)
+        unchanged = (
+            look is not None
+            and view is not None
+            and (
+                self._elsewhere.unchanged(
+                    view_image(frame.color, view.step), look.box.over(view.step)
+                )
+            )
+        )
+        if look is None or unchanged:
+            if unchanged:  # it has wandered on to what was there before
+                self._dark.forget()
+            surface.miss(None, dt)
+            return self._hidden(frame, dt)
         if view is not None:
-            if self._stood_there(frame, None, view, surface.person, said.look.box):
-                self._dark = None
-                surface.miss(None, dt)
-                return self._hidden(frame, dt)
-            surface.seen_elsewhere(view, said.look.box)
+            surface.seen_elsewhere(view, look.box, self._dark.depth(look.box))
         known = self._unread_for + dt <= self._parameters.predict_for
         belief = surface.belief() if known else None
-        score = min(_score(said.look, 0.0), IN_THE_DARK)
-        return self._told(frame, said.look.box, score, None, belief)
+        score = min(_score(look, 0.0), self._dark.most)
+        return self._told(frame, look.box, score, None, belief)
 
     def _glance(
         self,
@@ -494,7 +493,7 @@ class Follower:
                 if (
                     look is not None
                     and stood >= ELSEWHERE
-                    and not self._stood_there(frame, account, view, surface.person, look.box)
+                    and not self._stood_there(account, surface.person, look.box)
                     and not self._unlike(account, surface, look)
                 ):
                     surface.seen_elsewhere(view, look.box)
@@ -509,14 +508,14 @@ class Follower:
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
-    def _stood_there(
-        self, frame: Frame, account: Account | None, view: DepthView, person: Person, box: Box
-    ) -> bool:
+    def _stood_there(self, account: Account | None, person: Person, box: Box) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""
-        image = view_image(frame.color, view.step) if account is None else account.scene.image
-        if self._elsewhere.unchanged(image, box.over(view.step)):
-            return True
-        return account is not None and person.mobile and room_share(account, box) > IS_ROOM
+        if account is None:
+            return False
+        scene = account.scene
+        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
+            person.mobile and room_share(account, box) > IS_ROOM
+        )
 
     def _unlike(self, account: Account | None, surface: BySurface, look: Look) -> bool:
         """Whether what the look has found looks unlike the person who is followed."""
@@ -553,6 +552,7 @@ class Follower:
         """The track of the frame from which on the target is followed by its surface."""
         assert self.seen is not None
         box = outline_box(account.scene, self.seen)
+        self._dark.seen(frame, box, self.seen.depth, score)
         return self._told(frame, box, score, self.seen.depth, surface.belief())
 
     def _known_by_box(self, account: Account, gated: GatedLook) -> tuple[Silhouette, float] | None:

@@ -165,6 +165,11 @@ class GatedLook:
             onto = self._onto(account, look, dt)
         return Gated(look, stood, onto)
 
+    @property
+    def response(self) -> float | None:
+        """The filter's in the last frame against its recent mean, None where it was not asked."""
+        return self._look.response
+
     def settle(self) -> None:
         """Learn what no answer waits for; after each :meth:`step`, before the next."""
         self._look.settle()

@@ -353,9 +353,7 @@ def _meant(account: Account, box: Box) -> Silhouette | None:
     large = box.over(scene.view.step).area / (k.fx * k.fy)
     best, most = None, MEANT_IOU
     for seen in _people(account, box):
-        outline = box_about(scene, seen)
-        # Of somebody the upper half is drawn, or all of it badly, but not what is beside him.
-        overlap = outline.iou(box) if box.x < outline.cx < box.right else 0.0
+        overlap = box_about(scene, seen).iou(box)
         if overlap > most and large * seen.depth**2 > HEAD and _in_the_middle(scene, seen, box):
             best, most = seen, overlap
     return best

@@ -323,7 +323,8 @@ class MetricTargets:
 
     def _turns(self, dt: float) -> list[int]:
         """Which targets followed by their look have their turn: who has waited longest."""
-        numbers = [number for number, each in self._followers.items() if each.by_look]
+        depth = self.account is not None
+        numbers = [number for number, each in self._followers.items() if each.by_look(depth)]
         waiting = [number for number in self._waiting if number in numbers]
         waiting += [number for number in numbers if number not in waiting]
         count = max(1, round(TURNS * dt))

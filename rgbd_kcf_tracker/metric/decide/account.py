@@ -301,9 +301,8 @@ class Account:
         last = person.last
         if person.mobile or share == 0:
             return share
-        # What was never a figure may have been taken for what stands there.
-        if last is None or not person.figure:
-            return share if person.travelled > TRAVELLED else 0.0
+        if last is None:
+            return 0.0
         # What the outline of the last sight holds, about as deep, may have been the person.
         there, depth = (last.rows, last.cols), self.scene.view.depth
         step = STEP + STEP_PER_SECOND * min(self.time - person.seen_at, RECENT)
@@ -362,7 +361,7 @@ class Account:
         return person if odds >= (RETURN if person.chosen else self.against) else None
 
     def lately(self) -> list[Lately]:
-        """Those who were followed as figures until a moment ago and may still be there."""
+        """Those who were followed until a moment ago and may still be there, or fall from there."""
         return [
             Lately(person.last, person.area, person.misses > 0)
             for person in self.people

@@ -403,11 +403,16 @@ HEIGHT_MEMORY = 25
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Learned:
-    """A view, the seconds when it was seen, and the log-odds that it is of this person."""
+    """A view, the seconds when it was seen, and the log-odds that it is of this person.
+
+    Attributes:
+        before: what it has taken the place of, None for nothing.
+    """
 
     view: View
     time: float
     trust: float = math.inf
+    before: _Learned | None = None
 
     def says_more(self, other: _Learned) -> bool:
         """Whether it says more than one of the same look: surer, or of all of him, not a part."""
@@ -510,6 +515,8 @@ class Gallery:
             twins = [each for each, is_twin in zip(learned, alike.tolist(), strict=True) if is_twin]
             if not all(new.says_more(each) for each in twins):
                 return
+            if twins:
+                new = replace(new, before=replace(twins[-1], before=None))
             learned = [each for each in learned if each not in twins]
             if len(learned) >= MOST_VIEWS:
                 del learned[self._most_redundant()]
@@ -555,10 +562,12 @@ class Gallery:
     def taken_back(self, since: float) -> Gallery:
         """Take back what was learned from ``since`` on, in seconds: it was of somebody else."""
         late = Gallery()
-        for gallery, mine in ((late, True), (self, False)):
-            gallery._set_learned([each for each in self._learned if (each.time >= since) == mine])
-            gallery._set_tops([each for each in self._tops if (each[0] >= since) == mine])
-        late._set_learned([_Learned(each.view, each.time) for each in late._learned])
+        late._set_learned([_Learned(e.view, e.time) for e in self._learned if e.time >= since])
+        late._set_tops([each for each in self._tops if each[0] >= since])
+        # What has taken another's place gives it back.
+        before = (each if each.time < since else each.before for each in self._learned)
+        self._set_learned([each for each in before if each is not None and each.time < since])
+        self._set_tops([each for each in self._tops if each[0] < since])
         return late
 
     def _set_learned(self, learned: list[_Learned]) -> None:

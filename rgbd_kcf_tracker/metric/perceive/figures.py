@@ -201,19 +201,30 @@ def _has_lain_down(scene: Scene, left: int, top: int, mask: Mask) -> bool:
 
 
 def _low(scene: Scene, found: list[Figure], refused: list[Figure]) -> list[Figure]:
-    """Of those that are no figures the one where each was who is in none, however low it is."""
+    """Of those that are no figures the one where each was who is in none, however low it is.
+
+    Nor is he in a figure that is smaller and less where he was, as of who steps over him.
+    """
     low: list[Figure] = []
     for before in scene.lately:
-        most = max((_falls_to(before, figure.seen) for figure in found), default=0.0)
-        his = [(_falls_to(before, each.seen), each) for each in refused if each not in low]
-        his = [each for each in his if each[0] > max(most, STAYS)]
+        is_in = [(share, each) for each in found if (share := _shared(before, each.seen)) > STAYS]
+        most = max((share for share, _ in is_in), default=STAYS)
+        least = max((each.seen.area for _, each in is_in), default=0.0)
+        his = [
+            each
+            for each in refused
+            if each not in low and each.seen.area > least and _shared(before, each.seen) > most
+        ]
         if his:
-            low.append(max(his, key=lambda each: each[1].seen.area)[1])
+            low.append(max(his, key=lambda each: each.seen.area))
     return low
 
 
-def _falls_to(before: Silhouette, seen: Silhouette) -> float:
-    """Share of where a silhouette is that is where another was, or below, as of one who falls."""
+def _shared(before: Silhouette, seen: Silhouette) -> float:
+    """Share of the smaller of two boxes that both have, 0 to 1.
+
+    That about where somebody was, and as far below as he may have fallen, and a silhouette's.
+    """
     if abs(seen.depth - before.depth) > depth_step(before.depth):
         return 0.0
     deeper = FALL / before.height * before.mask.shape[0]
