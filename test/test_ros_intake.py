@@ -602,6 +602,10 @@ def test_two_publishers_are_no_bag_that_loops(apart_s: int, begun_anew: int) -> 
     [
         ({'on_time_jump': 'restart'}, True),  # nothing would choose him again
         ({'on_time_jump': 'restart', 'auto_init': True}, False),
+        (
+            {'on_time_jump': 'restart', 'auto_init': True, 'auto_init_near': 5.0},
+            True,
+        ),  # nobody is between
         ({'on_time_jump': 'restart', 'init_box': '1,2,30,40'}, False),
         ({'init_box': '1,2,30,40'}, True),
     ],

@@ -133,11 +133,12 @@ class Requests:
     def _on_restart(self) -> None:
         """The stamps went back for good, as a loop does (in the worker's thread).
 
-        Who was chosen otherwise than by a parameter is kept: nothing would choose him again.
+        Where no parameter would choose anybody again, who was chosen is kept.
         """
         settings = self._settings()
         box: Box | None = parse_box(settings.init_box)
-        if settings.on_time_jump != RESTART or (box is None and not settings.auto_init):
+        chooses = settings.auto_init and not auto_init_fault(settings)
+        if settings.on_time_jump != RESTART or (box is None and not chooses):
             return
         self._session.reset()
         if box is not None:
