@@ -279,6 +279,41 @@ def test_a_change_waits_for_the_hidden_and_drops_only_with_words() -> None:
     assert [words[:18] for words in refused] == ['target 2 is hidden']
 
 
+def test_who_is_dropped_for_a_change_goes_out_no_more() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 5)
+    run(made, 5, 5, [FIRST, THIRD])
+    made.configure('kcf', default_parameters('kcf'))
+    for number in range(10, 115):
+        run(made, number, 1, [FIRST, THIRD])
+        assert ids(made) == sorted(made.asked_for)
+    assert (made.variant, ids(made), len(refused)) == ('kcf', [1], 1)
+
+
+def test_of_several_added_who_are_all_hidden_a_change_waits_for_the_one_seen_last() -> None:
+    made, refused, _ = session()
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    made.add(lambda _: THIRD.box)
+    run(made, 0, 5)
+    made.remove(1)
+    run(made, 5, 3, [SECOND])
+    run(made, 8, 3, [])
+    made.configure('rgbd', default_parameters('rgbd'))
+    for number in range(11, 111, 3):
+        run(made, number, 1, [])
+    assert (made.asked_for, refused) == ({2, 3}, [])
+    for number in range(111, 400, 10):
+        run(made, number, 1, [])
+    assert (made.variant, made.asked_for, ids(made)) == ('metric', {2}, [2])
+    assert [words[:18] for words in refused] == ['target 3 is hidden']
+    run(made, 400, 10)
+    assert (made.variant, ids(made), len(refused)) == ('rgbd', [2], 1)
+    assert made.others[0].box.iou(SECOND.box) > 0.5
+
+
 def test_a_change_waits_for_the_only_one_left_however_long() -> None:
     made, refused, _ = session()
     made.choose(lambda _: FIRST.box)

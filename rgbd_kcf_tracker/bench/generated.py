@@ -102,8 +102,9 @@ def parameters_markdown() -> str:
         '',
         'A change of `variant` or of a parameter of the variant at work makes a new tracker on the '
         'boxes of the next frame that shows all who were chosen or added, so that a hidden target '
-        'is not lost by it. For the chosen one, and the last one that is left, it waits however '
-        'long; who was added and is hidden for ten seconds more is dropped, which the log and '
+        'is not lost by it. For the chosen one, and the last one that is left (of several who were '
+        'added and are all hidden the one who was seen last), it waits however long; who '
+        'was added and is hidden for ten seconds more is dropped, which the log and '
         '`/diagnostics` say. Whoever else is in view with `follow_everyone` keeps his id; who is '
         'hidden in that frame has another when he is seen again. A value that is what it was, or '
         'of another variant, changes nothing. '

@@ -92,6 +92,7 @@ class Session:
         self._variant, self._parameters = variant, parameters
         self._wanted = (variant, parameters)
         self._waits_from: int | None = None
+        self._seen_ns: dict[int, int] = {}
         self._targets = self._empty = TargetSet(variant, parameters)
         self._everyone = False
         self._chosen: int | None = None
@@ -433,13 +434,19 @@ class Session:
         chosen = None if self._chosen is None else tracks.pop(self._chosen)
         self.track = IDLE if chosen is None else self._named(chosen)
         self.others = tuple(self._named(track) for track in tracks.values())
+        asked = self.asked_for
+        self._seen_ns = {i: seen for i, seen in self._seen_ns.items() if i in asked}
+        for track in (self.track, *self.others):
+            if track.id in asked and _shown(track, frame):
+                self._seen_ns[track.id] = frame.stamp_ns
         self._story.follow(self.track, frame.stamp_ns)
 
     def _take_over(self, frame: Frame) -> None:
         """Go over to what is wanted, once all are seen who were chosen or added.
 
-        The chosen one is waited for, and who is the only one left; the others so long, and those
-        who are hidden then are dropped.
+        The chosen one is waited for however long, and so is the last one left where none was
+        chosen; the others for :data:`HIDDEN_WAIT_NS` since the change was asked for, and who of
+        them is hidden then is dropped. Where all are hidden, the one who was seen last is left.
         """
         if self._current:
             return
@@ -451,11 +458,12 @@ class Session:
             for track in (self.track, *self.others)
             if track.id in asked and not _shown(track, frame)
         ]
-        if hidden and (
-            self.track.id in hidden
-            or len(hidden) == len(asked)
-            or frame.stamp_ns - self._waits_from < HIDDEN_WAIT_NS
-        ):
+        long = frame.stamp_ns - self._waits_from >= HIDDEN_WAIT_NS
+        if hidden and (self.track.id in hidden or not long):
+            return
+        if hidden and len(hidden) == len(asked):
+            left = max(hidden, key=lambda number: (self._seen_ns.get(number, 0), number))
+            self._drop_hidden([number for number in hidden if number != left])
             return
         targets = self._empty.anew()
         everyone = self._everyone and targets.metric is not None
@@ -470,11 +478,7 @@ class Session:
             self._wanted = (self._variant, self._parameters)
             self._empty = self._targets
             return
-        for number in hidden:
-            self._report(
-                f'target {number} is hidden, also {HIDDEN_WAIT_NS / 1e9:.0f} s after variant or '
-                'parameters were changed: it is dropped'
-            )
+        self._drop_hidden(hidden)
         for inner, number in ids.items():
             if number not in asked:  # known from now on, by that id, and followed with everyone
                 targets.remove(inner)
@@ -485,6 +489,18 @@ class Session:
         kept = [inner for inner, number in ids.items() if number in asked]
         self._chosen, self._added = (kept[0], kept[1:]) if chosen else (None, kept)
         self.track, self.others = track, others
+
+    def _drop_hidden(self, numbers: list[int]) -> None:
+        """Drop those of these ids who were added, and say so."""
+        for number in numbers:
+            self._report(
+                f'target {number} is hidden, also {HIDDEN_WAIT_NS / 1e9:.0f} s after variant or '
+                'parameters were changed: it is dropped'
+            )
+        for inner in [i for i in self._added if self._ids[i] in numbers]:
+            self._targets.remove(inner)
+            self._added.remove(inner)
+        self.others = tuple(track for track in self.others if track.id not in numbers)
 
 
 def _shown(track: Track, frame: Frame) -> bool:
