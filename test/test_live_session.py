@@ -118,6 +118,27 @@ def test_who_was_added_and_is_chosen_keeps_his_id_and_is_followed_once(variant: 
     assert (ids(made), len(made._targets), refused) == ([3], 1, [])
 
 
+@pytest.mark.parametrize('variant', ['kcf', 'rgbd', 'rgbd_pf', 'metric'])
+def test_who_is_chosen_again_beside_others_keeps_his_id(variant: str) -> None:
+    made, refused, _ = session(variant)
+    made.choose(lambda _: FIRST.box)
+    made.add(lambda _: SECOND.box)
+    run(made, 0, 3)
+    for first in (3, 6):  # and again
+        made.choose(lambda _: FIRST.box.moved(3, 2))
+        run(made, first, 3)
+        assert (made.track.id, ids(made), len(made._targets)) == (1, [1, 2], 2)
+    made.choose(lambda _: THIRD.box)
+    run(made, 9, 3)
+    assert (made.track.id, ids(made), len(made._targets)) == (3, [2, 3], 2)
+    made.choose(lambda _: FIRST.box)  # dropped meanwhile; metric knows him
+    run(made, 12, 3)
+    assert made.track.id == (1 if variant == 'metric' else 4)
+    made.remove(2)
+    run(made, 15, 1)
+    assert (len(made._targets), refused) == (1, [])
+
+
 def test_so_many_are_followed_at_once_and_no_more() -> None:
     made, refused, _ = session('kcf')
     made.most = 2

@@ -344,8 +344,8 @@ class Session:
     def start(self, frame: Frame, box: Box) -> bool:
         """Take this target; where that fails, the one that is followed is kept, and it is said.
 
-        Alone, it starts with nothing remembered; among others, with what is known of all. One of
-        those who were added keeps his id, and is followed once.
+        Alone, it starts with nothing remembered; among others, with what is known of all: who was
+        chosen or added keeps his id, and is followed once.
         """
         among = self._added or self._targets.everyone
         targets = self._targets if among else self._empty.anew()
@@ -361,11 +361,13 @@ class Session:
             self._targets.remove(self._chosen)
         if inner in self._added:
             self._added.remove(inner)
-        if targets.metric is None:  # which knows by itself who is in a box
-            for old in [i for i in self._added if self._ids[i] == shown]:
+        # With metric the same person has the same id in the set; otherwise a start has a new one.
+        old = next((i for i, number in self._ids.items() if number == shown), None)
+        if targets.metric is None and old is not None:
+            if old in self._added:
                 targets.remove(old)
                 self._added.remove(old)
-                self._ids[inner] = self._ids.pop(old)
+            self._ids[inner] = self._ids.pop(old)
         self._chosen = inner
         self.track = self._named(targets.started(inner))
         self.others = tuple(t for t in self.others if t.id != self.track.id)
