@@ -636,6 +636,8 @@ def image(array: np.ndarray, encoding: str) -> SimpleNamespace:
         ('walks', 16, {'frozen_depth': 24}),  # half a second
         ('noise', 40, {}),  # depth that stands still is right where nothing moves
         ('stands', 40, {}),
+        ('darker', 40, {}),  # nor is the light a change, as of a day that goes
+        ('exposed', 40, {}),
         ('covered', 40, {'empty_depth': 40}),
     ],
 )
@@ -647,6 +649,7 @@ def test_depth_that_hangs_is_left_out_and_told(
     process = Processor(session()[0], silent, statistics, time.time_ns, statistics.error)
     rng = np.random.default_rng(4)
     picture = rng.integers(80, 160, (240, 320, 3), np.uint8)
+    picture[:, 200:] //= 4  # a dark side
     depth = np.full((240, 320), 0 if what == 'covered' else 2000, np.uint16)
 
     def has_depth(index: int, depth: np.ndarray) -> bool:
@@ -655,6 +658,10 @@ def test_depth_that_hangs_is_left_out_and_told(
             color[60:180, 100 + 2 * index : 140 + 2 * index] = (20, 40, 200)
         elif what == 'noise':
             color += rng.integers(0, 16, color.shape, np.uint8)
+        elif what == 'darker':
+            color = (color * (1 - index / 80)).astype(np.uint8)
+        elif what == 'exposed':
+            color += np.uint8(2 * index)
         capture = Capture(image(color, 'bgr8'), image(depth, '16UC1'), None, 0)
         return process.frame(capture, BASE + index * 33 * MS).depth is not None
 
@@ -665,6 +672,26 @@ def test_depth_that_hangs_is_left_out_and_told(
         assert 'repeats one image: restart it' in statistics.snapshot().last_error
         depth[5, 5] += 1
         assert has_depth(40, depth)
+
+
+def test_depth_that_stood_still_is_used_again_once_the_picture_is_as_before() -> None:
+    process = Processor(
+        session()[0],
+        SimpleNamespace(image_wanted=True),
+        Statistics(),
+        time.time_ns,
+        lambda *_: None,
+    )
+    picture = np.random.default_rng(4).integers(80, 160, (240, 320, 3), np.uint8)
+    depth = np.full((240, 320), 2000, np.uint16)
+    used = []
+    for index in range(60):
+        color = picture.copy()
+        if 20 <= index < 40:  # as a screen that is on meanwhile
+            color[60:120, 100:140] = 255
+        capture = Capture(image(color, 'bgr8'), image(depth, '16UC1'), None, 0)
+        used.append(process.frame(capture, BASE + index * 33 * MS).depth is not None)
+    assert used == [True] * 20 + [False] * 20 + [True] * 20
 
 
 def test_a_picture_that_stands_still_for_seconds_is_told_and_used() -> None:

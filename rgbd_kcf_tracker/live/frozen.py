@@ -26,7 +26,7 @@ COLOR_AFTER_NS = 5 * NANOSECONDS
 COARSE = 64, 48
 """Fields of a picture, whose mean colours tell a change from noise."""
 CHANGED, LEAST_FIELDS = 6, 3
-"""Levels by which so many fields differ where something has moved."""
+"""Levels by which so many fields differ where something has moved, beside the light."""
 
 
 class Repeated:
@@ -54,14 +54,14 @@ class FrozenDepth:
 
     def __init__(self) -> None:
         self._repeated = Repeated()
-        self._before: npt.NDArray[np.int16] | None = None
-        self._changed = False
+        self._before: npt.NDArray[np.float32] | None = None
 
     def __call__(self, data: Any, color: ColorImage, time_ns: int) -> bool:
         """Take in a pair.
 
-        A change of the picture counts, not its noise: that of a simulator may be noise alone, and
-        where nothing moves, depth that stands still is right.
+        A change of the picture counts, for as long as it is there; not its noise, nor the light of
+        all of it: that of a simulator may be noise alone, and where nothing moves, depth that
+        stands still is right.
 
         Args:
             data: bytes of the depth message.
@@ -70,13 +70,24 @@ class FrozenDepth:
         """
         self._repeated.take(data, time_ns)
         if self._repeated.images < 2:
-            self._before, self._changed = None, False
+            self._before = None
             return False
-        if not self._changed:
-            now = cv2.resize(color, COARSE, interpolation=cv2.INTER_AREA).astype(np.int16)
-            if self._before is None:
-                self._before = now
-            by = np.abs(now - self._before).max(axis=2)
-            self._changed = int(np.count_nonzero(by > CHANGED)) >= LEAST_FIELDS
+        now = cv2.resize(color, COARSE, interpolation=cv2.INTER_AREA).astype(np.float32)
+        if self._before is None:
+            self._before = now
         long = self._repeated.lasted_ns >= DEPTH_AFTER_NS
-        return self._changed and long and self._repeated.images >= LEAST_IMAGES
+        return long and self._repeated.images >= LEAST_IMAGES and _changed(self._before, now)
+
+
+def _changed(before: npt.NDArray[np.float32], now: npt.NDArray[np.float32]) -> bool:
+    """Whether more is another than the light, which adds as much everywhere, or scales all."""
+    if not _differ(before, now):
+        return False
+    added = np.median(now - before, axis=(0, 1))
+    scale = np.median((now + 1) / (before + 1), axis=(0, 1))
+    return _differ(before + added, now) and _differ(before * scale, now)
+
+
+def _differ(one: npt.NDArray[np.float32], other: npt.NDArray[np.float32]) -> bool:
+    by = np.abs(one - other).max(axis=2)
+    return int(np.count_nonzero(by > CHANGED)) >= LEAST_FIELDS
