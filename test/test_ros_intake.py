@@ -711,6 +711,22 @@ def test_a_picture_that_stands_still_for_seconds_is_told_and_used() -> None:
     assert '/color/image' in words[199]
 
 
+def test_a_frozen_picture_that_is_started_on_is_counted_once() -> None:
+    statistics = Statistics()
+    publishers = SimpleNamespace(
+        image_wanted=True, publish=lambda _: None, publish_extras=lambda _: None
+    )
+    process = Processor(session()[0], publishers, statistics, time.time_ns, pytest.fail)
+    for index in range(7):
+        color = image(np.zeros((24, 32, 3), np.uint8), 'bgr8')
+        color.header.stamp.sec += index
+        process(Capture(color, None, None, time.monotonic_ns()))
+    before = statistics.snapshot().counts['frozen_color']
+    process.choose(lambda _: Box(4, 4, 12, 12), 60.0)
+    assert process.session.following
+    assert statistics.snapshot().counts['frozen_color'] == before == 2
+
+
 def until(condition: Callable[[], object]) -> None:
     end = time.monotonic() + 30
     while not condition():

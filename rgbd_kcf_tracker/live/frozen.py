@@ -38,15 +38,16 @@ class Repeated:
         self.images = 0
         self.lasted_ns = 0
 
-    def take(self, data: Any, time_ns: int) -> None:
-        """The next image; the last one over again, as the same object, says nothing."""
+    def take(self, data: Any, time_ns: int) -> bool:
+        """The next image; the last one over again, as the same object, says nothing: False."""
         if data is self._data:
-            return
+            return False
         if self._data is None or not same_bytes(data, self._data):
             self._since_ns, self.images = time_ns, 0
         self._data = data
         self.images += 1
         self.lasted_ns = time_ns - self._since_ns
+        return True
 
 
 class FrozenDepth:

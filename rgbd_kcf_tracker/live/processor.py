@@ -262,8 +262,9 @@ class Processor:
         except ImageError as error:
             self._fault('bad_color', f'colour image cannot be read: {error}')
             return None
-        self._repeated.take(capture.color.data, time_ns)
-        if self._repeated.images >= LEAST_IMAGES and self._repeated.lasted_ns >= COLOR_AFTER_NS:
+        another = self._repeated.take(capture.color.data, time_ns)
+        long = self._repeated.lasted_ns >= COLOR_AFTER_NS
+        if another and long and self._repeated.images >= LEAST_IMAGES:
             self._statistics.count('frozen_color')
         depth: DepthImage | None = None
         if capture.depth is not None and self._depth_wanted():

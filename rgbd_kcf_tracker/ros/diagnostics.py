@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.track import TrackState
 
 RECENT_ERROR_S = 5.0
 ALARMING_SHARE = 0.1
-"""A tenth of the images dropped, late, repeated or without partner is worth a warning."""
+"""A tenth of the images dropped, late, without partner or frozen is worth a warning."""
 LATENCY_NAMES = ('mean', 'median', 'p99', 'max')
 
 
