@@ -568,6 +568,18 @@ def test_a_camera_that_pauses_is_no_jump(pause_s: int) -> None:
             assert moment.time_ns == BASE + (pause_s + set_s) * 1000 * MS
 
 
+@pytest.mark.parametrize('pauses_s', [(0, 100), (100, 0), (100, 100)])
+def test_a_wrong_stamp_about_a_pause_is_no_loop(pauses_s: tuple[int, int]) -> None:
+    for set_s, restarted in ((0, False), (59, False), (61, True), (-sum(pauses_s) - 1, True)):
+        line = Timeline()
+        line.advance(BASE, 0)
+        arrival = pauses_s[0] * 1000 * MS + 33 * MS
+        assert line.advance(BASE + 86_400_000 * MS, arrival).jumped
+        arrival += pauses_s[1] * 1000 * MS + 33 * MS
+        moment = line.advance(BASE + arrival + set_s * 1000 * MS, arrival)
+        assert (moment.jumped, moment.restarted) == (True, restarted)
+
+
 def test_restarts_are_counted_over_all_configurations() -> None:
     statistics = Statistics()
     publishers = SimpleNamespace(

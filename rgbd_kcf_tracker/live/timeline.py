@@ -55,7 +55,7 @@ class Timeline:
         self._time: int | None = None
         self._stamp = 0
         self._arrival = 0
-        self._before_jump: int | None = None
+        self._before_jump: tuple[int, int] | None = None  # the stamp, and its arrival
 
     def advance(self, stamp_ns: int, arrival_ns: int) -> Instant:
         """The instant of an image.
@@ -72,16 +72,21 @@ class Timeline:
         jumped = restarted = False
         if not 0 < step <= waited + LARGEST_STEP_NS:
             jumped = step != 0
-            old = self._before_jump
-            returned = old is not None and 0 < stamp_ns - old <= LARGEST_STEP_NS
-            restarted = step < 0 and not returned
-            self._before_jump = self._stamp if step > 0 else None
+            restarted = step < 0 and not self._returns(stamp_ns, arrival_ns)
+            self._before_jump = (self._stamp, self._arrival) if step > 0 else None
             step = min(waited, LARGEST_STEP_NS)
         elif self._before_jump is not None:
             self._before_jump = None  # two images on the new course: it is the course now
         self._time += step
         self._stamp, self._arrival = stamp_ns, arrival_ns
         return Instant(self._time, jumped, restarted)
+
+    def _returns(self, stamp_ns: int, arrival_ns: int) -> bool:
+        """Whether the stamps go on as before the last one, however long a pause there was."""
+        if self._before_jump is None:
+            return False
+        stamp, arrival = self._before_jump
+        return 0 < stamp_ns - stamp <= arrival_ns - arrival + LARGEST_STEP_NS
 
 
 class StampRepair:
