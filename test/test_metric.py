@@ -324,7 +324,9 @@ def test_nothing_goes_on_in_the_dark_from_one_who_may_be_another_nor_for_long_ou
     look = dark.step(frame, 0.1, True)
     assert look is not None
     assert look.box.iou(one.box) > 0.9
-    assert dark.depth(look.box.scaled(2)) == pytest.approx(1.3, rel=0.05)
+    assert dark.depth(frame, look.box.scaled(2)) == pytest.approx(1.3, rel=0.05)
+    twice = Frame(np.repeat(np.repeat(frame.color, 2, 0), 2, 1), None, 0, CAMERA)
+    assert dark.depth(twice, look.box.stretched(2, 2)) == pytest.approx(2.6, rel=0.05)
     assert dark.most == 0.6, 'what it was; nothing has borne it out'
     assert [dark.step(empty, 0.2, True) for _ in range(3)] == [None] * 3
     assert not dark.runs

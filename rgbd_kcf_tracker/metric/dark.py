@@ -17,8 +17,8 @@ SOUGHT = 0.5
 """Seconds for which one that gets out of sight is sought by its colours alone: some frames at 5 Hz.
 Later it may have left, and somebody else is like it."""
 MOST_SURE = 0.8
-"""Score of what nothing but the look tells, at the most: of four such boxes three are right, where
-depth does not come back and people go (docs/experiments.md)."""
+"""Score of what nothing but the look tells, at the most: it is right less often than what depth
+bears out (docs/experiments.md)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,10 +82,11 @@ class Dark:
         """The filter's in the last frame against its own recent mean, None without."""
         return None if self._gated is None else self._gated.response
 
-    def depth(self, box: Box) -> float:
-        """Metres to the target in a box, by how much larger or smaller that is than its last."""
+    def depth(self, frame: Frame, box: Box) -> float:
+        """Metres to the target in a box of a frame, by how much larger that is than its last."""
         assert self._last is not None
-        return self._last.depth * self._last.box.height / box.height
+        was = self._last.box.height / self._last.frame.height  # images may have another size by now
+        return self._last.depth * was / (box.height / frame.height)
 
     def step(self, frame: Frame, dt: float, turn: bool) -> Look | None:
         """Look for it in the next frame, which has no depth, ``dt`` seconds later.

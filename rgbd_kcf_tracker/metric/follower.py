@@ -450,11 +450,7 @@ class Follower:
         unchanged = (
             look is not None
             and view is not None
-            and (
-                self._elsewhere.unchanged(
-                    view_image(frame.color, view.step), look.box.over(view.step)
-                )
-            )
+            and self._stood_there(frame, None, view, surface.person, look.box)
         )
         if look is None or unchanged:
             if unchanged:  # it has wandered on to what was there before
@@ -462,7 +458,7 @@ class Follower:
             surface.miss(None, dt)
             return self._hidden(frame, dt)
         if view is not None:
-            surface.seen_elsewhere(view, look.box, self._dark.depth(look.box))
+            surface.seen_elsewhere(view, look.box, self._dark.depth(frame, look.box))
         known = self._unread_for + dt <= self._parameters.predict_for
         belief = surface.belief() if known else None
         score = min(_score(look, 0.0), self._dark.most)
@@ -493,7 +489,7 @@ class Follower:
                 if (
                     look is not None
                     and stood >= ELSEWHERE
-                    and not self._stood_there(account, surface.person, look.box)
+                    and not self._stood_there(frame, account, view, surface.person, look.box)
                     and not self._unlike(account, surface, look)
                 ):
                     surface.seen_elsewhere(view, look.box)
@@ -508,14 +504,14 @@ class Follower:
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
-    def _stood_there(self, account: Account | None, person: Person, box: Box) -> bool:
+    def _stood_there(
+        self, frame: Frame, account: Account | None, view: DepthView, person: Person, box: Box
+    ) -> bool:
         """Whether a box shows what was there when the target was seen elsewhere, or the room."""
-        if account is None:
-            return False
-        scene = account.scene
-        return self._elsewhere.unchanged(scene.image, box.over(scene.view.step)) or (
-            person.mobile and room_share(account, box) > IS_ROOM
-        )
+        image = view_image(frame.color, view.step) if account is None else account.scene.image
+        if self._elsewhere.unchanged(image, box.over(view.step)):
+            return True
+        return account is not None and person.mobile and room_share(account, box) > IS_ROOM
 
     def _unlike(self, account: Account | None, surface: BySurface, look: Look) -> bool:
         """Whether what the look has found looks unlike the person who is followed."""
