@@ -49,6 +49,14 @@ def _plain(image: npt.NDArray[Any], name: str, nothing: np.generic) -> npt.NDArr
     return image  # one that is only read where it is looked at
 
 
+def unregistered(depth: tuple[int, ...], color: tuple[int, int]) -> str:
+    """What is wrong where depth and colour have different sizes, ``(width, height)`` each."""
+    return (
+        f'depth is {depth[0]}x{depth[1]} but colour is {color[0]}x{color[1]}: '
+        'register the depth to the colour image first'
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """Colour, registered depth, stamp and camera of one moment.
@@ -98,10 +106,7 @@ class Frame:
                 'expected (height, width) float32 metres'
             )
         if depth.shape != color.shape[:2]:
-            raise ImageError(
-                f'depth is {depth.shape[1]}x{depth.shape[0]} but colour is '
-                f'{color.shape[1]}x{color.shape[0]}: register the depth to the colour image first'
-            )
+            raise ImageError(unregistered(depth.shape[::-1], (self.width, self.height)))
 
     @property
     def width(self) -> int:

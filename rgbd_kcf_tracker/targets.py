@@ -141,7 +141,8 @@ class TargetSet:
     def update(self, frame: Frame) -> dict[int, Track]:
         """Follow all into the next frame, in time order; their tracks by id.
 
-        Never raises for what the picture shows.
+        Never raises for what the picture shows. Images stay as they are for as long as
+        :meth:`Tracker.update` says.
         """
         if self._together is not None:
             return self._together.update(frame)

@@ -93,6 +93,8 @@ class Tracker(Protocol):
 
         Before :meth:`start`, the answer is IDLE. A frame of another size than the first is taken
         as a restart of the stream: the tracker goes on with what it remembers where it can.
+        The images must stay as they are until the next frame is answered: where that has no depth,
+        a look may be learned from this one.
         """
         ...
 

@@ -275,12 +275,18 @@ def test_ids_stay_when_the_variant_changes() -> None:
     assert made.others[0].box.iou(SECOND.box) > 0.5
 
 
-def test_a_change_waits_for_the_hidden_and_drops_only_with_words() -> None:
+def with_one_hidden() -> tuple[Session, list[str]]:
+    """Two targets, of whom the second is out of sight after ten frames; and what was refused."""
     made, refused, _ = session()
     made.choose(lambda _: FIRST.box)
     made.add(lambda _: SECOND.box)
     run(made, 0, 5)
     run(made, 5, 5, [FIRST, THIRD])
+    return made, refused
+
+
+def test_a_change_waits_for_the_hidden_and_drops_only_with_words() -> None:
+    made, refused = with_one_hidden()
     assert made.others[0].box is None
     made.configure('metric', default_parameters('metric').replace(lost_after=5.0))
     run(made, 10, 5, [FIRST, THIRD])
@@ -301,11 +307,7 @@ def test_a_change_waits_for_the_hidden_and_drops_only_with_words() -> None:
 
 
 def test_who_is_dropped_for_a_change_goes_out_no_more() -> None:
-    made, refused, _ = session()
-    made.choose(lambda _: FIRST.box)
-    made.add(lambda _: SECOND.box)
-    run(made, 0, 5)
-    run(made, 5, 5, [FIRST, THIRD])
+    made, refused = with_one_hidden()
     made.configure('kcf', default_parameters('kcf'))
     for number in range(10, 115):
         run(made, number, 1, [FIRST, THIRD])

@@ -73,11 +73,17 @@ class FrozenDepth:
         if self._repeated.images < 2:
             self._before = None
             return False
-        now = cv2.resize(color, COARSE, interpolation=cv2.INTER_AREA).astype(np.float32)
         if self._before is None:
-            self._before = now
+            self._before = _coarse(color)
         long = self._repeated.lasted_ns >= DEPTH_AFTER_NS
-        return long and self._repeated.images >= LEAST_IMAGES and _changed(self._before, now)
+        many = self._repeated.images >= LEAST_IMAGES
+        return long and many and _changed(self._before, _coarse(color))
+
+
+def _coarse(color: ColorImage) -> npt.NDArray[np.float32]:
+    """The mean colours of its fields."""
+    means = cv2.resize(color, COARSE, interpolation=cv2.INTER_AREA)
+    return np.asarray(means, np.float32)
 
 
 def _changed(before: npt.NDArray[np.float32], now: npt.NDArray[np.float32]) -> bool:

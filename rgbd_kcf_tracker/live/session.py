@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.live.story import Story, taken
 from rgbd_kcf_tracker.metric.targets import SAME_BOX
 from rgbd_kcf_tracker.parameters import Parameters
 from rgbd_kcf_tracker.pose import Pose
+from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 from rgbd_kcf_tracker.targets import TargetSet
 from rgbd_kcf_tracker.track import Track, TrackState
 from rgbd_kcf_tracker.variants import create_tracker
@@ -39,7 +40,7 @@ REQUESTS_CREDIT_S = 0.3
 """So much of it is saved up: a few requests in a row are met at once."""
 MOST_ADDITIONS = 50
 """Targets that wait to be added at most."""
-HIDDEN_WAIT_NS = 10_000_000_000
+HIDDEN_WAIT_NS = 10 * NANOSECONDS
 """So long a change of variant or parameters waits for those who were added and are hidden."""
 _ALREADY = 'what is in that box is followed already, as target {}'
 
@@ -496,8 +497,8 @@ class Session:
         """Drop those of these ids who were added, and say so."""
         for number in numbers:
             self._report(
-                f'target {number} is hidden, also {HIDDEN_WAIT_NS / 1e9:.0f} s after variant or '
-                'parameters were changed: it is dropped'
+                f'target {number} is hidden, also {HIDDEN_WAIT_NS // NANOSECONDS} s after variant '
+                'or parameters were changed: it is dropped'
             )
         for inner in [i for i in self._added if self._ids[i] in numbers]:
             self._targets.remove(inner)

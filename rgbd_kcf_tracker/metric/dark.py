@@ -99,7 +99,7 @@ class Dark:
         if self._last is None or (self._gated is None and not turn):
             return None
         if self._gated is None:
-            # Its depth is not there any more: what shows must look as it did without.
+            # By colours alone, as in the frames to come.
             before, box = replace(self._last.frame, depth=None), self._last.box
             look = ByLook(before, box, self._parameters)
             self._gated = GatedLook(look, None, box, self._since, self._parameters.seen_ratio)

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.frame import unregistered
 from rgbd_kcf_tracker.recordings.files import require_source
 from rgbd_kcf_tracker.recordings.recording import ReadOptions, Recording, RecordingInfo
 from rgbd_kcf_tracker.recordings.sequences import SequenceFolder, is_sequence_folder
@@ -62,8 +63,4 @@ def _with_odd_sizes(info: RecordingInfo) -> RecordingInfo:
     depth, color = sizes.get('depth'), sizes.get('color')
     if depth is None or color is None or depth == color:
         return info
-    warning = (
-        f'depth is {depth[0]}x{depth[1]} but colour is {color[0]}x{color[1]}: '
-        'register the depth to the colour image first'
-    )
-    return replace(info, warnings=(*info.warnings, warning))
+    return replace(info, warnings=(*info.warnings, unregistered(depth, color)))
