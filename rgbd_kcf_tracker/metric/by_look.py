@@ -18,9 +18,8 @@ from functools import partial
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image, Mask
+from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting, share_after
@@ -297,7 +296,7 @@ class ByLook:
         """Whether depth showed nothing of the target when it was chosen."""
         return self._first_depth is None
 
-    def own(self, image: Image) -> npt.NDArray[np.float32]:
+    def own(self, image: Image) -> Floats:
         """Probability of each pixel's colour to be the target's and not of what is around it.
 
         Args:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.by_look import UNSURE, ByLook, Look, as_near
@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray, DepthView, part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -95,7 +95,7 @@ class GatedLook:
         self._newcomers = Newcomers(account, box, since, about)
         self._agreed, self._unseen = 0, 0.0
         self._mobile = self._carried = False
-        self._began: tuple[tuple[slice, slice], DepthArray] | None = None
+        self._began: tuple[tuple[slice, slice], Floats] | None = None
         self._last: Box | None = box
         self._at: FloatArray | None = None
         self.stood: Stood | None = None

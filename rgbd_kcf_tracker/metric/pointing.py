@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.errors import BoxError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
@@ -135,7 +135,7 @@ def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
     return box
 
 
-def _connected(view: DepthView, mask: npt.NDArray[np.bool_], row: int, column: int) -> Box | None:
+def _connected(view: DepthView, mask: Mask, row: int, column: int) -> Box | None:
     """Box in the colour image of the part of ``mask`` that is connected to a pixel of the view."""
     surfaces = surfaces_in(view.depth, mask, JUMP_M, JUMP_SHARE)
     row, column = _nearest(surfaces.labels > 0, row, column)
@@ -145,7 +145,7 @@ def _connected(view: DepthView, mask: npt.NDArray[np.bool_], row: int, column: i
     return Box(*(float(side) * view.step for side in surfaces.boxes[label]))
 
 
-def _level(view: DepthView, elevation: npt.NDArray[np.float32] | None) -> npt.NDArray[np.bool_]:
+def _level(view: DepthView, elevation: Floats | None) -> Mask:
     """Pixels of surfaces that lie rather than stand: down the image, their height hardly falls."""
     if elevation is None:
         rows = np.arange(view.shape[0], dtype=np.float32)[:, None]
@@ -153,11 +153,11 @@ def _level(view: DepthView, elevation: npt.NDArray[np.float32] | None) -> npt.ND
     fall = np.zeros(view.shape, np.float32)
     fall[REACH:-REACH] = elevation[: -2 * REACH] - elevation[2 * REACH :]
     upright_fall = view.depth * np.float32(2 * REACH / view.intrinsics.fy)
-    level: npt.NDArray[np.bool_] = fall < LEVEL_SHARE * upright_fall
+    level: Mask = fall < LEVEL_SHARE * upright_fall
     return level
 
 
-def _nearest(mask: npt.NDArray[np.bool_], row: float, column: float) -> tuple[int, int]:
+def _nearest(mask: Mask, row: float, column: float) -> tuple[int, int]:
     """Row and column of the set pixel nearest to a place, (-1, -1) where none is near."""
     reach = max(math.ceil(NEAREST * mask.shape[1]), 1)
     top, left = max(int(row) - reach, 0), max(int(column) - reach, 0)

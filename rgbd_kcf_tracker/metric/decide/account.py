@@ -11,9 +11,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
@@ -369,7 +368,7 @@ class Account:
             if self.time - person.seen_at <= (COAST if person.hidden else FALLS)
         ]
 
-    def somebody(self) -> npt.NDArray[np.bool_]:
+    def somebody(self) -> Mask:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
         mask = np.zeros(self.scene.view.shape, np.bool_)
         for person, index in self.in_view.items():

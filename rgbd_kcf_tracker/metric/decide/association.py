@@ -10,10 +10,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.decide.account import RECENT, SAME_AGAIN, Sight
 from rgbd_kcf_tracker.metric.decide.arrivals import away
-from rgbd_kcf_tracker.metric.decide.mix_ups import Likeness
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import came
@@ -36,7 +35,7 @@ def log_odds(
     time: float,
     against: float,
     joined: Callable[[tuple[Looks, ...]], Looks],
-) -> tuple[FloatArray, FloatArray, list[Likeness]]:
+) -> tuple[FloatArray, FloatArray, list[Floats]]:
     """Of ``m`` people being ``n`` sights, by place, look and height.
 
     Args:

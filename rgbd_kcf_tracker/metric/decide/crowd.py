@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.decide.account import (
     MISSES,
     RECENT,
@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.metric.decide.account import (
 from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, assigned, log_odds
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
-from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, Likeness, MixUps
+from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE, learn_sighting
 from rgbd_kcf_tracker.metric.decide.stayed import stayed
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
@@ -271,7 +271,7 @@ class Crowd:
 
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float
-    ) -> tuple[Account, list[Likeness]]:
+    ) -> tuple[Account, list[Floats]]:
         """The account, and the ``(v, n, 2)`` likeness of its sights to each one's views."""
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
@@ -474,8 +474,8 @@ class Crowd:
 
 
 def _followed(
-    account: Account, alike: list[Likeness]
-) -> tuple[list[Followed], list[tuple[Person, Likeness]]]:
+    account: Account, alike: list[Floats]
+) -> tuple[list[Followed], list[tuple[Person, Floats]]]:
     """Those in view who are known, and those who are not in view, for :class:`MixUps`.
 
     Args:

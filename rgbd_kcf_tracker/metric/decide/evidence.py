@@ -14,8 +14,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.identity.tally import SUREST
 
 FADE = 1.0
@@ -90,7 +90,7 @@ class Evidence:
         """By how much somebody else explains the figure better than the target does, log-odds."""
         return max(0.0, self.rival - max(self.mine, 0.0))
 
-    def features(self) -> npt.NDArray[np.float64]:
+    def features(self) -> FloatArray:
         """The regression's inputs, ``(len(WEIGHTS),)``, the last of them 1."""
         near = math.exp(-self.gone / FADE)
         away = 1.0 - math.exp(-self.gone / AWAY)

@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -35,7 +34,7 @@ class ExpectedBody:
         half = self.width / 2
         return (*view.place(x - half, y, z), *view.place(x + half, y + self.height, z))
 
-    def _inside(self, scene: Scene) -> tuple[npt.NDArray[np.float32], float]:
+    def _inside(self, scene: Scene) -> tuple[Floats, float]:
         """Depth where it is expected, and the pixels it would have if none were outside."""
         box = self.box(scene.view)
         if box is None:

@@ -14,14 +14,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
-
-Likeness = npt.NDArray[np.float32]
 
 NEAR = 1.0
 """Metres between two from which one may have been taken for the other: closer, arms touch and two
@@ -57,7 +54,7 @@ class Followed(NamedTuple):
     place: FloatArray
     view: View
     column: int
-    alike: Likeness
+    alike: Floats
 
 
 class MixUp(NamedTuple):
@@ -95,7 +92,7 @@ class MixUps:
         self._time, self._counts = 0.0, 1.0
 
     def watch(
-        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Likeness]], time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Floats]], time: float
     ) -> MixUp | None:
         """Take the next frame.
 
@@ -139,7 +136,7 @@ class MixUps:
         return found
 
     def _came_out(
-        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Likeness]], time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Floats]], time: float
     ) -> MixUp | None:
         """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
         hidden = [(who, alike) for who, alike in gone if time - who.seen_at < HIDDEN_FOR]

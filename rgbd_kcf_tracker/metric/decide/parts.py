@@ -13,6 +13,7 @@ from itertools import compress
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Mask
 from rgbd_kcf_tracker.metric.perceive.room import tolerance
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -105,7 +106,7 @@ class Others:
     parts: Parts
     theirs: list[bool]
 
-    def within(self, rows: slice, cols: slice) -> npt.NDArray[np.bool_]:
+    def within(self, rows: slice, cols: slice) -> Mask:
         """Those in a part of the view, bool."""
         return np.array(self.theirs)[self.parts.kinds[rows, cols]]
 

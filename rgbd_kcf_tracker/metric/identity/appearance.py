@@ -10,13 +10,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from scipy import fft
 
-from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image, Mask
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
+from rgbd_kcf_tracker.metric.identity.color_posterior import Codes, ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.masked_filter import MaskedFilter, Spectrum, spectrum_of
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 
@@ -65,7 +64,7 @@ class _Reading:
     cy: float
     scale: float
     spectrum: Spectrum
-    codes: npt.NDArray[np.int32]
+    codes: Codes
 
 
 class Appearance:
@@ -115,20 +114,20 @@ class Appearance:
         self.learn(color, box.cx, box.cy, 1.0, None)
         self.mean_peak = FIRST_PEAK * self.look(color, box.cx, box.cy, 1.0).peak
 
-    def _boxed(self, factor: float) -> npt.NDArray[np.bool_]:
+    def _boxed(self, factor: float) -> Mask:
         place = np.abs(np.arange(self._pixels) + 0.5 - self._pixels / 2)
         across = place <= self._target[0] * factor / 2
         down = place <= self._target[1] * factor / 2
-        inside: npt.NDArray[np.bool_] = down[:, None] & across[None, :]
+        inside: Mask = down[:, None] & across[None, :]
         return inside
 
-    def _cell_box(self, factor: float) -> npt.NDArray[np.bool_]:
+    def _cell_box(self, factor: float) -> Mask:
         place = np.abs(np.arange(self._cells) + 0.5 - self._cells / 2) * (
             self._pixels / self._cells
         )
         across = place <= max(self._target[0] * factor / 2, 2.0)
         down = place <= max(self._target[1] * factor / 2, 2.0)
-        inside: npt.NDArray[np.bool_] = down[:, None] & across[None, :]
+        inside: Mask = down[:, None] & across[None, :]
         return inside
 
     def _read(self, color: Image, cx: float, cy: float, scale: float) -> _Reading:
@@ -136,7 +135,7 @@ class Appearance:
         spectrum = spectrum_of(self._features(window))
         return _Reading(cx, cy, scale, spectrum, rgb_codes(window))
 
-    def posterior(self, color: Image) -> npt.NDArray[np.float32]:
+    def posterior(self, color: Image) -> Floats:
         """How likely each pixel of an image is the target's by its colour, ``(h, w)`` 0 to 1."""
         return self._colors.of(rgb_codes(color))
 
@@ -210,7 +209,7 @@ class Appearance:
         self._colors.learn(read.codes, self._inner, self._near & ~self._outer, color_rate)
         self._filter.learn(read.spectrum, self._mask(read.codes), rate)
 
-    def _mask(self, codes: npt.NDArray[np.int32]) -> npt.NDArray[np.float32]:
+    def _mask(self, codes: Codes) -> Floats:
         """Where in the window the filter may look: the pixels of the target's colours."""
         if not self._masked:
             return self._core.astype(np.float32)
@@ -222,7 +221,7 @@ class Appearance:
         if mask[self._core].mean() < MIN_MASK:
             return self._core.astype(np.float32)
         mask = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-        result: npt.NDArray[np.float32] = np.maximum(mask, np.float32(0.3) * self._core)
+        result: Floats = np.maximum(mask, np.float32(0.3) * self._core)
         return result
 
 

@@ -8,20 +8,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.perceive.color_bands import (
     BANDS,
     band_histograms,
     band_similarity,
     bands_of_rows,
 )
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, ColorCodes, smoothed
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, Codes, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-
-Codes = npt.NDArray[np.int32]
 
 GROW_TIME = 0.4
 SHRINK_TIME = 4.0
@@ -99,7 +96,7 @@ class Body:
         self._usual_area = self.area
         self._colors = np.zeros((BANDS, CODES), np.float32)
         self._around = np.full(CODES, 1 / CODES, np.float32)
-        self._odds: npt.NDArray[np.float32] | None = None
+        self._odds: Floats | None = None
 
     # -- where a silhouette puts the body ---------------------------------------------------------
 
@@ -173,13 +170,11 @@ class Body:
 
     def _histograms(
         self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float
-    ) -> npt.NDArray[np.float32]:
+    ) -> Floats:
         row, rows = self._rows(seen, view, top)
         return band_histograms(codes[seen.rows, seen.cols], seen.mask, row, rows)
 
-    def odds_of(
-        self, codes: Codes, seen: Silhouette, view: DepthView, top: float
-    ) -> npt.NDArray[np.float32]:
+    def odds_of(self, codes: Codes, seen: Silhouette, view: DepthView, top: float) -> Floats:
         """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
 
         Args:
@@ -194,8 +189,7 @@ class Body:
             floor = np.float32(ODDS_FLOOR)
             odds = np.log((self._colors + floor) / (self._around + floor))
             self._odds = np.clip(odds, -ODDS_LIMIT, ODDS_LIMIT)
-        result: npt.NDArray[np.float32] = self._odds[band[:, None], codes]
-        return result
+        return self._odds[band[:, None], codes]
 
     # -- learning ---------------------------------------------------------------------------------
 

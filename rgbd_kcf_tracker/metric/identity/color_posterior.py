@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Mask
+from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 
 Codes = npt.NDArray[np.int32]
 
@@ -21,11 +21,10 @@ neither has even odds, while one pixel, which is thirty times as much of a targe
 all."""
 
 
-def rgb_codes(color: npt.NDArray[np.uint8]) -> Codes:
+def rgb_codes(color: Image) -> Codes:
     """Code 0 to 4095 of each pixel, ``(h, w)``: 16 levels a channel of ``(h, w, 3)`` uint8."""
     levels = (color >> 4).astype(np.int32)
-    codes: Codes = (levels[:, :, 0] << 8) + (levels[:, :, 1] << 4) + levels[:, :, 2]
-    return codes
+    return (levels[:, :, 0] << 8) + (levels[:, :, 1] << 4) + levels[:, :, 2]
 
 
 class ColorPosterior:
@@ -36,8 +35,8 @@ class ColorPosterior:
     """
 
     def __init__(self) -> None:
-        self._target: npt.NDArray[np.float32] | None = None
-        self._around: npt.NDArray[np.float32] | None = None
+        self._target: Floats | None = None
+        self._around: Floats | None = None
         self._posterior = np.full(CODES, 0.5, np.float32)
 
     def learn(self, codes: Codes, target: Mask, around: Mask, rate: float) -> None:
@@ -54,7 +53,6 @@ class ColorPosterior:
         prior = np.float32(PRIOR)
         self._posterior = (self._target + prior) / (self._target + self._around + 2 * prior)
 
-    def of(self, codes: Codes) -> npt.NDArray[np.float32]:
+    def of(self, codes: Codes) -> Floats:
         """Posterior of each pixel, 0 to 1, in the shape of ``codes``."""
-        result: npt.NDArray[np.float32] = self._posterior[codes]
-        return result
+        return self._posterior[codes]

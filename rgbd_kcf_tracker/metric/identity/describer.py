@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.errors import ParameterError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
@@ -117,6 +116,6 @@ class Describer:
         return (since, last) if alike and time - since < FRESH else None
 
 
-def _near(place: FloatArray, places: FloatArray) -> npt.NDArray[np.bool_]:
-    near: npt.NDArray[np.bool_] = np.hypot(*(places - place).T) < ALONE
+def _near(place: FloatArray, places: FloatArray) -> Mask:
+    near: Mask = np.hypot(*(places - place).T) < ALONE
     return near

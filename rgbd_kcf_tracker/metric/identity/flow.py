@@ -17,14 +17,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.features.optical_flow import Points, followed
 from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.metric.identity.appearance import MIN_MASK
 
-Posterior = Callable[[Image], npt.NDArray[np.float32]]
+Posterior = Callable[[Image], Floats]
 
 SIDE, AROUND = 144, 3.0
 """Pixels along a side of the window in which the flow is looked for, and its side in units of the

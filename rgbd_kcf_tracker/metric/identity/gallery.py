@@ -286,8 +286,7 @@ class Compared:
 
     @property
     def _trusted(self) -> Floats:
-        alike: Floats = np.minimum(self.alike, self.most[..., None])
-        return alike
+        return np.minimum(self.alike, self.most[..., None])
 
     def likeness(self) -> Floats:
         """``(n, 2)``: :meth:`similarity` and :attr:`network` of each, as far as it is trusted."""

@@ -14,9 +14,8 @@ view.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
@@ -107,7 +106,7 @@ class HiddenCloud:
             self._positions, self._velocities = self._positions[kept], self._velocities[kept]
             self._weights = np.full(count, 1.0 / count)
 
-    def _seen_empty(self, view: DepthView, middle: float) -> npt.NDArray[np.bool_]:
+    def _seen_empty(self, view: DepthView, middle: float) -> Mask:
         """Particles past which the camera sees."""
         k = view.intrinsics
         rows, cols = view.shape
@@ -119,7 +118,7 @@ class HiddenCloud:
         inside = ahead & (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
         row, column = np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)
         seen = view.depth[row.astype(np.intp), column.astype(np.intp)]
-        empty: npt.NDArray[np.bool_] = inside & (seen > z + EMPTY_MARGIN)
+        empty: Mask = inside & (seen > z + EMPTY_MARGIN)
         return empty
 
     @property

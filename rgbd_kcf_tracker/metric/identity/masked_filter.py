@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.features.labels import gaussian_labels
 
 Features = npt.NDArray[np.float32]
@@ -53,9 +54,9 @@ class MaskedFilter:
         labels = gaussian_labels((size, size), sigma, np.float32)
         self._label = np.conj(fft.rfft2(labels)).astype(np.complex64)
         self._filter: Spectrum | None = None
-        self._weights: npt.NDArray[np.float32] | None = None
+        self._weights: Floats | None = None
 
-    def _solved(self, spectrum: Spectrum, mask: npt.NDArray[np.float32]) -> Spectrum:
+    def _solved(self, spectrum: Spectrum, mask: Floats) -> Spectrum:
         shape = (self.size, self.size)
         power = (spectrum.real**2 + spectrum.imag**2).astype(np.float32)
         cross = spectrum * self._label
@@ -77,7 +78,7 @@ class MaskedFilter:
         result: Spectrum = masked.astype(np.complex64)
         return result
 
-    def learn(self, spectrum: Spectrum, mask: npt.NDArray[np.float32], rate: float) -> None:
+    def learn(self, spectrum: Spectrum, mask: Floats, rate: float) -> None:
         """Take one sample: windowed features with the target in the middle, and its mask.
 
         Args:
@@ -96,7 +97,7 @@ class MaskedFilter:
             self._filter = (1 - r) * self._filter + r * solved
             self._weights = (1 - r) * self._weights + r * weights
 
-    def response(self, spectrum: Spectrum) -> npt.NDArray[np.float32]:
+    def response(self, spectrum: Spectrum) -> Floats:
         """How much each shift of the window looks like the target, ``(size, size)``, cyclic.
 
         Element 0, 0 stands for the window's middle. About 1 at the peak where all is as learned.
@@ -107,5 +108,5 @@ class MaskedFilter:
         assert self._filter is not None, 'learn first'
         assert self._weights is not None, 'learn first'
         product = np.einsum('chw,c->hw', np.conj(self._filter) * spectrum, self._weights)
-        result: npt.NDArray[np.float32] = fft.irfft2(product, s=(self.size, self.size))
+        result: Floats = fft.irfft2(product, s=(self.size, self.size))
         return result

@@ -41,14 +41,12 @@ class MotionFilter:
     @property
     def sigma(self) -> FloatArray:
         """Standard deviation of the position, ``(3,)`` metres."""
-        result: FloatArray = np.sqrt(self._p00)
-        return result
+        return np.sqrt(self._p00)
 
     @property
     def speed_sigma(self) -> FloatArray:
         """Standard deviation of the velocity, ``(3,)`` metres per second."""
-        result: FloatArray = np.sqrt(self._p11)
-        return result
+        return np.sqrt(self._p11)
 
     def predict(self, dt: float, noise: float = 1.0) -> None:
         """Move on by ``dt`` seconds, with ``noise`` times the acceleration."""

@@ -10,11 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
@@ -173,8 +172,7 @@ class Person:
         walks = (1 - anywhere) * walks * ROOM_AREA + anywhere
         stands = self._stands(gone)
         if stands == 0:
-            odds: FloatArray = np.log(walks)
-            return odds
+            return np.log(walks)
         swayed = PLACE_SIGMA**2 + (SWAYING * min(gone, COAST)) ** 2
         still = _density(_off(places, self.place), swayed)
         odds = np.log(stands * still * ROOM_AREA + (1 - stands) * walks)
@@ -194,7 +192,7 @@ class Person:
         self.place, self.seen_at, self.misses = place, time, 0
         self.last, self.hidden = None, True
 
-    def missed(self, depth: DepthArray) -> None:
+    def missed(self, depth: Floats) -> None:
         """Take a frame in which it was not found.
 
         Args:
@@ -338,5 +336,4 @@ def _off(places: FloatArray, place: FloatArray) -> FloatArray:
 
 def _density(squared: FloatArray, variance: float) -> FloatArray:
     """Of a place at squared distances ``(n,)``, to the square metre, for a variance each way."""
-    density: FloatArray = np.exp(-0.5 * squared / variance) / (2 * np.pi * variance)
-    return density
+    return np.exp(-0.5 * squared / variance) / (2 * np.pi * variance)

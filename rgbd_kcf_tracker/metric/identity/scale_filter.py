@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import fft
 
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, CHANNELS, HogExtractor
 from rgbd_kcf_tracker.features.labels import gaussian_labels
 from rgbd_kcf_tracker.features.windows import sampled
@@ -50,10 +51,10 @@ class ScaleFilter:
         self._label = np.conj(fft.rfft(label)).astype(np.complex64)
         self._window = np.hanning(COUNT + 2)[1:-1].astype(np.float32)
         self._numerator: npt.NDArray[np.complex64] | None = None
-        self._denominator: npt.NDArray[np.float32] | None = None
+        self._denominator: Floats | None = None
 
     def _spectrum(
-        self, color: npt.NDArray[np.uint8], cx: float, cy: float, width: float, height: float
+        self, color: Image, cx: float, cy: float, width: float, height: float
     ) -> npt.NDArray[np.complex64]:
         rows, cols = color.shape[:2]
         reach = 0.5 * self._factors[-1] * max(width, height) + 4
@@ -83,7 +84,7 @@ class ScaleFilter:
 
     def learn(
         self,
-        color: npt.NDArray[np.uint8],
+        color: Image,
         cx: float,
         cy: float,
         width: float,
@@ -101,9 +102,7 @@ class ScaleFilter:
         self._numerator += r * (numerator - self._numerator)
         self._denominator += r * (denominator - self._denominator)
 
-    def factor(
-        self, color: npt.NDArray[np.uint8], cx: float, cy: float, width: float, height: float
-    ) -> float:
+    def factor(self, color: Image, cx: float, cy: float, width: float, height: float) -> float:
         """By how much the target's size has changed from ``width`` x ``height``."""
         assert self._numerator is not None, 'learn first'
         assert self._denominator is not None, 'learn first'

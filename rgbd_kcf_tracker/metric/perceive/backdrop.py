@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image, Mask
+from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
 from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import (
@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.metric.perceive.ego_motion import (
     stands,
 )
 
-Posterior = Callable[[Image], npt.NDArray[np.float32]]
+Posterior = Callable[[Image], Floats]
 
 DIFFERS = 14
 """Levels of a channel by which a pixel differs from the backdrop. Of a picture made small by means
@@ -364,7 +364,7 @@ class _Pieces:
 
     labels: npt.NDArray[np.int32]
     areas: npt.NDArray[np.int64]
-    at_edge: npt.NDArray[np.bool_]
+    at_edge: Mask
 
     def overlap(self, there: Mask | tuple[slice, slice]) -> npt.NDArray[np.int64]:
         """Pixels of each piece in a mask, or in rows and columns, ``(n,)``."""
@@ -373,8 +373,7 @@ class _Pieces:
 
     def mask(self, those: Mask) -> Mask:
         """Where the pieces chosen by ``those``, ``(n,)``, are."""
-        chosen: Mask = (those & (self.areas > 0))[self.labels]
-        return chosen
+        return (those & (self.areas > 0))[self.labels]
 
 
 def _pieces(mask: Mask) -> _Pieces:

@@ -8,15 +8,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, smoothed
 
 BANDS = 4
 """Horizontal bands of a body: about head, chest, hips and legs of a person."""
 
 
-def band_histograms(
-    codes: npt.NDArray[np.int32], mask: npt.NDArray[np.bool_], top: float, height: float
-) -> npt.NDArray[np.float32]:
+def band_histograms(codes: npt.NDArray[np.int32], mask: Mask, top: float, height: float) -> Floats:
     """Smoothed counts of colour codes in each band, ``(BANDS, CODES)`` float32.
 
     Args:
@@ -40,7 +39,7 @@ def bands_of_rows(count: int, top: float, height: float) -> npt.NDArray[np.int32
     return band
 
 
-def band_similarity(counts: npt.NDArray[np.float32], model: npt.NDArray[np.float32]) -> float:
+def band_similarity(counts: Floats, model: Floats) -> float:
     """Bhattacharyya coefficient of the bands, weighted by how many pixels ``counts`` has in each.
 
     Args:

@@ -18,7 +18,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.metric.perceive.light import STRIDE
+
+Codes = npt.NDArray[np.int32]
 
 LIGHTNESS, TINTS = 10, 7
 """Levels of lightness, and of red and blue against green each: with 8 to 14 and 7 to 13 of them
@@ -46,7 +49,7 @@ _TINT = np.minimum(
 _TINT_OF_RED = _TINT * TINTS
 
 
-def _blur(levels: int) -> npt.NDArray[np.float32]:
+def _blur(levels: int) -> Floats:
     """The symmetric matrix that shares each of ``levels`` counts with its neighbours."""
     beside = np.eye(levels, k=1) + np.eye(levels, k=-1)
     beside[0, 0] = beside[-1, -1] = 1.0
@@ -58,7 +61,7 @@ _LUMA = np.array([0.114, 0.587, 0.299])
 """Shares of blue, green and red in lightness, which are OpenCV's (ITU-R BT.601)."""
 
 
-def view_image(color: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uint8]:
+def view_image(color: Image, step: int) -> Image:
     """Every ``step``-th pixel of a ``(H, W, 3)`` uint8 BGR image, each from the middle of a step.
 
     Args:
@@ -77,14 +80,14 @@ def view_image(color: npt.NDArray[np.uint8], step: int) -> npt.NDArray[np.uint8]
     return image
 
 
-def color_codes(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.int32]:
+def color_codes(image: Image) -> Codes:
     """Code 0 to ``CODES - 1`` of each pixel, ``(h, w)``, of an image ``(h, w, 3)`` uint8 BGR.
 
     Lightness counts ``TINTS ** 2``, red against green ``TINTS``, blue against green 1.
     """
     logs = cv2.LUT(image, _LOG)
     blue, green, red = cv2.split(logs)
-    codes: npt.NDArray[np.int32] = cv2.LUT(cv2.cvtColor(logs, cv2.COLOR_BGR2GRAY), _LEVEL)
+    codes: Codes = cv2.LUT(cv2.cvtColor(logs, cv2.COLOR_BGR2GRAY), _LEVEL)
     offset = _TOP - green  # may wrap, as its sums with the others then do: they lie in 0 to 2 _TOP
     codes += cv2.LUT(red + offset, _TINT_OF_RED)
     codes += cv2.LUT(blue + offset, _TINT)
@@ -100,9 +103,9 @@ class ColorCodes:
         image: ``(h, w, 3)`` uint8 BGR.
     """
 
-    def __init__(self, image: npt.NDArray[np.uint8]) -> None:
+    def __init__(self, image: Image) -> None:
         self._image = image
-        self._made: dict[tuple[int, int, int, int], npt.NDArray[np.int32]] = {}
+        self._made: dict[tuple[int, int, int, int], Codes] = {}
 
     @cached_property
     def grey(self) -> bool:
@@ -111,7 +114,7 @@ class ColorCodes:
         apart = max(cv2.norm(green, other, cv2.NORM_INF) for other in (blue, red))
         return bool(apart <= COLORLESS)
 
-    def __getitem__(self, part: tuple[slice, slice]) -> npt.NDArray[np.int32]:
+    def __getitem__(self, part: tuple[slice, slice]) -> Codes:
         """Those of some rows and columns, ``(h, w)``; the same array for whoever asks."""
         rows, cols = part
         key = rows.start, rows.stop, cols.start, cols.stop
@@ -121,7 +124,7 @@ class ColorCodes:
         return codes
 
 
-def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+def smoothed(counts: Floats) -> Floats:
     """Each code's count shared with its neighbours: 1/4, 1/2, 1/4 along each of the three axes.
 
     A small change of light then does not move a colour out of its bin.
@@ -133,16 +136,16 @@ def smoothed(counts: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         The same shape.
     """
     tinted = counts.reshape(-1, TINTS * TINTS) @ _BLUR_TINTS
-    result: npt.NDArray[np.float32] = _BLUR_LEVEL @ tinted.reshape(-1, LIGHTNESS, TINTS * TINTS)
+    result: Floats = _BLUR_LEVEL @ tinted.reshape(-1, LIGHTNESS, TINTS * TINTS)
     return result.reshape(counts.shape)
 
 
-def palette() -> npt.NDArray[np.float32]:
+def palette() -> Floats:
     """A colour for each code, for showing what a histogram holds, ``(CODES, 3)`` BGR 0 to 255."""
     level = (np.arange(LIGHTNESS) + 0.5) * (_TOP / LIGHTNESS / _STEPS)
     tint = np.arctanh(2 * (np.arange(TINTS) + 0.5) / TINTS - 1) / STEEPNESS
     y, red, blue = np.meshgrid(level, tint, tint, indexing='ij')
     green = y - _LUMA[0] * blue - _LUMA[2] * red
     logs = np.stack((green + blue, green, green + red), axis=-1).reshape(CODES, 3)
-    colors: npt.NDArray[np.float32] = np.clip(DARKEST * np.expm1(logs), 0, 255).astype(np.float32)
+    colors: Floats = np.clip(DARKEST * np.expm1(logs), 0, 255).astype(np.float32)
     return colors

@@ -9,12 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
-
-DepthArray = npt.NDArray[np.float32]
 
 SAMPLES = 24
 """Readings along the shorter side of a part of the image: some hundreds are enough for a median,
@@ -62,7 +60,7 @@ class DepthView:
         intrinsics: of the view, that is the colour image's divided by ``step``.
     """
 
-    depth: DepthArray
+    depth: Floats
     step: int
     intrinsics: Intrinsics
 

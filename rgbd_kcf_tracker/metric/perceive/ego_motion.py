@@ -18,13 +18,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
 from rgbd_kcf_tracker.features.optical_flow import followed
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.pose import Pose
 
-GrayImage = npt.NDArray[np.uint8]
 Points = npt.NDArray[np.floating]
 
 NEAREST = 0.05
@@ -110,9 +109,9 @@ class _Anchor:
         corners: ``(n, 2)`` float32 of what stands there; None until they are looked for.
     """
 
-    gray: GrayImage
+    gray: Image
     view: DepthView
-    others: npt.NDArray[np.bool_]
+    others: Mask
     age: float = 0.0
     corners: Points | None = None
 
@@ -121,7 +120,7 @@ class EgoMotion:
     """Tells the motion of one stream's camera."""
 
     def __init__(self) -> None:
-        self._gray: GrayImage | None = None
+        self._gray: Image | None = None
         self._view: DepthView | None = None
         self._anchor: _Anchor | None = None
         self._asks = False
@@ -130,9 +129,9 @@ class EgoMotion:
 
     def update(
         self,
-        image: npt.NDArray[np.uint8],
+        image: Image,
         view: DepthView,
-        others: npt.NDArray[np.bool_],
+        others: Mask,
         seconds: float,
     ) -> Pose | Lost | None:
         """The motion since the last view: the pose of the last camera's frame in that of now.
@@ -176,7 +175,7 @@ class EgoMotion:
             self._anchor, self._since_crept = None, 0.0
         return crept
 
-    def _turns(self, gray: GrayImage, others: npt.NDArray[np.bool_]) -> bool:
+    def _turns(self, gray: Image, others: Mask) -> bool:
         """Whether a camera seems to have moved since it stood, though from no frame to the next."""
         if self._anchor is None or self._unasked < ASKED:
             return False
@@ -194,7 +193,7 @@ class EgoMotion:
             self._since_crept = 0.0
 
 
-def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | None = None) -> bool:
+def changed(last: Image, gray: Image, among: Mask | None = None) -> bool:
     """Whether so much of a picture has changed that its camera may have moved.
 
     Args:
@@ -216,9 +215,7 @@ def changed(last: GrayImage, gray: GrayImage, among: npt.NDArray[np.bool_] | Non
     return bool(np.count_nonzero(moved) >= least)
 
 
-def corners_between(
-    last: GrayImage, gray: GrayImage, usable: npt.NDArray[np.bool_]
-) -> tuple[Points, Points] | None:
+def corners_between(last: Image, gray: Image, usable: Mask) -> tuple[Points, Points] | None:
     """Corners of a picture, and where they are in the next, ``(n, 2)`` each.
 
     Args:
@@ -236,7 +233,7 @@ def corners_between(
     return corners[good], found[good]
 
 
-def _corners(gray: GrayImage, usable: npt.NDArray[np.bool_]) -> Points:
+def _corners(gray: Image, usable: Mask) -> Points:
     """The strongest corners of a picture, ``(n, 2)`` float32, where they are usable."""
     corners = cv2.goodFeaturesToTrack(
         gray, CORNERS, CORNER_QUALITY, CORNER_DISTANCE, mask=usable.astype(np.uint8) * 255
@@ -244,7 +241,7 @@ def _corners(gray: GrayImage, usable: npt.NDArray[np.bool_]) -> Points:
     return np.zeros((0, 2), np.float32) if corners is None else corners.reshape(-1, 2)
 
 
-def stands(last: GrayImage, gray: GrayImage, first: Points, second: Points) -> bool:
+def stands(last: Image, gray: Image, first: Points, second: Points) -> bool:
     """Whether the camera stands still, by where corners are in two pictures.
 
     A camera that sets its exposure anew, as somebody steps before it, moves every corner by a part
@@ -271,23 +268,23 @@ def _still(first: Points, second: Points) -> bool:
     return int(np.count_nonzero(still)) >= LEAST_CORNERS and _share(still, first) >= LEAST_STILL
 
 
-def _stood(first: Points, second: Points) -> npt.NDArray[np.bool_]:
+def _stood(first: Points, second: Points) -> Mask:
     """Which corners are where they were, ``(n,)`` bool."""
-    stood: npt.NDArray[np.bool_] = np.abs(second - first).max(axis=1) < STILL
+    stood: Mask = np.abs(second - first).max(axis=1) < STILL
     return stood
 
 
-def upper_median(values: GrayImage) -> int:
+def upper_median(values: Image) -> int:
     """The upper median: of bytes, counting them is a quarter of the time of ``np.median``."""
     below = np.bincount(values.ravel(), minlength=256).cumsum()
     return int(np.searchsorted(below, values.size // 2, side='right'))
 
 
 def _told(
-    last: GrayImage,
+    last: Image,
     last_view: DepthView,
-    gray: GrayImage,
-    others: npt.NDArray[np.bool_],
+    gray: Image,
+    others: Mask,
     seconds: float,
 ) -> Pose | Lost | None:
     corners = corners_between(last, gray, _usable(last_view, others))
@@ -313,7 +310,7 @@ def _told(
     return motion if _bears_out(motion, first, second, last_view) else None
 
 
-def _crept(anchor: _Anchor, gray: GrayImage) -> Pose | None:
+def _crept(anchor: _Anchor, gray: Image) -> Pose | None:
     """The motion since a picture where corners that have moved for good bear it out."""
     if anchor.corners is None:
         anchor.corners = _corners(anchor.gray, _usable(anchor.view, anchor.others))
@@ -344,12 +341,12 @@ def _bears_out(motion: Pose, first: FloatArray, second: FloatArray, view: DepthV
     return _have_moved(told, first) and _share(told, first) > _share(denied, first)
 
 
-def _have_moved(which: npt.NDArray[np.bool_], corners: FloatArray) -> bool:
+def _have_moved(which: Mask, corners: FloatArray) -> bool:
     """Whether there are enough corners that have moved for good."""
     return int(np.count_nonzero(which)) >= LEAST_CREEPING and _share(which, corners) >= CREEPING
 
 
-def _share(which: npt.NDArray[np.bool_], corners: Points) -> float:
+def _share(which: Mask, corners: Points) -> float:
     """Share of the view, as far as it has corners, that some of its corners stand for, 0 to 1.
 
     Args:
@@ -362,11 +359,11 @@ def _share(which: npt.NDArray[np.bool_], corners: Points) -> float:
     return float(weights[which].sum() / weights.sum())
 
 
-def _usable(view: DepthView, others: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def _usable(view: DepthView, others: Mask) -> Mask:
     """Pixels, ``(h, w)`` bool, that have depth and lie beside nothing that may move by itself."""
     side = 2 * BESIDE + 1
     about = cv2.dilate(others.view(np.uint8), np.ones((side, side), np.uint8)).view(np.bool_)
-    usable: npt.NDArray[np.bool_] = (view.depth > 0) & ~about
+    usable: Mask = (view.depth > 0) & ~about
     return usable
 
 

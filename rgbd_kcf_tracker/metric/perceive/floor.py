@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -75,26 +75,24 @@ class Floor:
     height: float
     tilt: float
 
-    def elevation(self, depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    def elevation(self, depth: Floats) -> Floats:
         """Metres above the floor of each pixel, ``(h, w)`` float32; ``height`` where depth is 0."""
         h, w = depth.shape
         rows = np.arange(h, dtype=np.float32)[:, None] * np.float32(self.b)
         columns = np.arange(w, dtype=np.float32)[None, :] * np.float32(self.a) + np.float32(self.c)
-        above: npt.NDArray[np.float32] = rows + columns
+        above: Floats = rows + columns
         above *= depth
         np.subtract(np.float32(1.0), above, out=above)
         above *= np.float32(self.height)
         return above
 
-    def forward(
-        self, depth: npt.NDArray[np.float32], elevation: npt.NDArray[np.float32]
-    ) -> npt.NDArray[np.float32]:
+    def forward(self, depth: Floats, elevation: Floats) -> Floats:
         """Metres from the camera along the floor of each pixel, ``(h, w)`` float32.
 
         Of an upright body it is the same from head to feet, which depth is not where the camera
         looks down.
         """
-        ahead: npt.NDArray[np.float32] = elevation - np.float32(self.height)
+        ahead: Floats = elevation - np.float32(self.height)
         ahead *= np.float32(self.tilt)
         ahead += depth
         ahead *= np.float32(1 / np.sqrt(1 - self.tilt**2))
@@ -278,7 +276,7 @@ class FloorFinder:
         return Floor.of(plane, k)
 
 
-def _inverse(view: DepthView, first: int, end: int) -> npt.NDArray[np.float32]:
+def _inverse(view: DepthView, first: int, end: int) -> Floats:
     """Inverse depth of every few pixels of some rows, NaN where there is no reading."""
     depth = view.depth[first:end:STRIDE, REACH : max(view.shape[1] - REACH, 0) : STRIDE]
     return np.divide(1, depth, out=np.full_like(depth, np.nan), where=depth > 0)

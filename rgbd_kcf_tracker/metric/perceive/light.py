@@ -13,9 +13,8 @@ from functools import reduce
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 
 DARKEST, BRIGHTEST = 12, 243
 """Values between which a channel is neither noise nor saturated."""
@@ -43,13 +42,13 @@ class Light:
     def __init__(self) -> None:
         self.gain = np.ones(3)
         self._mean = np.ones(3)
-        self._first: npt.NDArray[np.float32] | None = None
+        self._first: Floats | None = None
 
     def restart(self) -> None:
         """Forget what the room looked like, but not the light: the camera looks elsewhere."""
         self._first = None
 
-    def steadied(self, image: Image, still: npt.NDArray[np.bool_], learns: bool = True) -> Image:
+    def steadied(self, image: Image, still: Mask, learns: bool = True) -> Image:
         """An image ``(h, w, 3)`` BGR in the light of the first.
 
         Args:
@@ -71,7 +70,7 @@ class Light:
         result: Image = cv2.LUT(image, table[None])
         return result
 
-    def _measure(self, image: Image, still: npt.NDArray[np.bool_]) -> None:
+    def _measure(self, image: Image, still: Mask) -> None:
         small = image[::STRIDE, ::STRIDE].astype(np.float32)
         if self._first is None or self._first.shape != small.shape:
             self._first = small * self.gain.astype(np.float32)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 BREADTH = 0.4
@@ -47,7 +47,7 @@ NOBODY = np.zeros((0, 2))
 
 def parted(
     view: DepthView,
-    forward: npt.NDArray[np.float32],
+    forward: Floats,
     right: FloatArray,
     left: int,
     top: int,
@@ -124,7 +124,7 @@ def parted(
     return parts
 
 
-def _farther(mask: Mask, ahead: npt.NDArray[np.float32], metres: float) -> Mask | None:
+def _farther(mask: Mask, ahead: Floats, metres: float) -> Mask | None:
     """Of two people one behind the other the pixels of the farther, None where it is but one.
 
     Args:
@@ -169,9 +169,9 @@ def _nearest(points: FloatArray, seeds: FloatArray) -> npt.NDArray[np.intp]:
 
 def _heads(
     mask: Mask,
-    depth: npt.NDArray[np.float32],
-    ahead: npt.NDArray[np.float32],
-    columns: npt.NDArray[np.float64],
+    depth: Floats,
+    ahead: Floats,
+    columns: FloatArray,
     above: float,
     x_of: float,
     y_of: float,

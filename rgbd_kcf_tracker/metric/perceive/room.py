@@ -16,9 +16,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Mask
+from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthArray
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
 
@@ -68,21 +67,21 @@ BEHIND = 0.4
 he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
 
 
-def tolerance(depth: DepthArray) -> DepthArray:
+def tolerance(depth: Floats) -> Floats:
     """Metres by which a reading may differ from another of the same place, ``(h, w)``."""
-    allowed: DepthArray = np.square(depth)
+    allowed: Floats = np.square(depth)
     allowed *= np.float32(NOISE_PER_SQUARE_METRE)
     allowed += np.float32(NOISE)
     return allowed
 
 
-def _leap(dt: float, noise: DepthArray) -> DepthArray:
+def _leap(dt: float, noise: Floats) -> Floats:
     """Metres by which the depth of somebody may have gone up, given the noise of each reading."""
-    leap: DepthArray = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + noise
+    leap: Floats = np.float32(LEAP + LEAP_PER_SECOND * min(dt, 1.0)) + noise
     return leap
 
 
-def _seen_from(depth: DepthArray, motion: Pose, k: Intrinsics) -> DepthArray:
+def _seen_from(depth: Floats, motion: Pose, k: Intrinsics) -> Floats:
     """A depth image as the moved camera sees it, ``(h, w)``, 0 where nothing is known."""
     rows, cols = depth.shape
     v, u = np.nonzero(depth)
@@ -174,7 +173,7 @@ class Room:
         self.restart(np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_))
         self._unlearned = 0.0
 
-    def restart(self, depth: DepthArray, somebody: Mask) -> None:
+    def restart(self, depth: Floats, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
         self.depth = np.where(somebody, np.float32(0), depth)
         self.before = somebody & (depth > 0)
@@ -187,7 +186,7 @@ class Room:
         self._stood, self._stood_at = np.zeros_like(depth), np.zeros_like(depth)
         self._time = self._unlearned = 0.0
 
-    def open(self, somebody: Mask, depth: DepthArray) -> None:
+    def open(self, somebody: Mask, depth: Floats) -> None:
         """Take pixels, ``(h, w)`` bool, out of the room: they turned out to be somebody.
 
         What is known to be close behind them stays so: when it shows again, only that tells it from
@@ -200,13 +199,13 @@ class Room:
         self._blind[somebody] = BLIND_FRAMES
         self._front[somebody] = depth[somebody]
 
-    def close(self, part: Mask, depth: DepthArray) -> None:
+    def close(self, part: Mask, depth: Floats) -> None:
         """Take pixels, ``(h, w)`` bool, into the room: they turned out to be part of it."""
         self.depth[part] = depth[part]
         self._blind[part] = 0
         self.before &= ~part
 
-    def passing(self, people: Mask, depth: DepthArray, surfaces: Surfaces) -> Mask:
+    def passing(self, people: Mask, depth: Floats, surfaces: Surfaces) -> Mask:
         """Those of people's pixels, ``(h, w)`` bool, whose surface does not stand before the room.
 
         They passed for the room as they were first seen.
@@ -220,15 +219,13 @@ class Room:
         theirs, before = (
             np.bincount(surfaces.labels[each], minlength=len(surfaces)) for each in (people, nearer)
         )
-        result: Mask = people & (before < MOST * theirs)[surfaces.labels]
-        return result
+        return people & (before < MOST * theirs)[surfaces.labels]
 
-    def _nearer(self, depth: DepthArray) -> Mask:
+    def _nearer(self, depth: Floats) -> Mask:
         """Pixels, ``(h, w)`` bool, that show something before the room as far as it is known."""
-        nearer: Mask = (depth > 0) & (self.depth > 0) & (self.depth - depth > tolerance(depth))
-        return nearer
+        return (depth > 0) & (self.depth > 0) & (self.depth - depth > tolerance(depth))
 
-    def hardly(self, depth: DepthArray, part: tuple[slice, slice]) -> Mask:
+    def hardly(self, depth: Floats, part: tuple[slice, slice]) -> Mask:
         """Pixels of a part of a view, bool, nearer than the room by less than tells them from it.
 
         Args:
@@ -240,7 +237,7 @@ class Room:
         near: Mask = (nearer > np.float32(CLOSER) * allowed) & (nearer <= allowed)
         return near & (depth > 0) & (room > 0)
 
-    def agrees(self, depth: DepthArray) -> bool:
+    def agrees(self, depth: Floats) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
         if depth.shape != self.depth.shape:
             return False
@@ -274,9 +271,9 @@ class Room:
     def goes_on(
         self,
         somebody: Mask,
-        depth: DepthArray,
+        depth: Floats,
         surfaces: Surfaces,
-        large: npt.NDArray[np.bool_],
+        large: Mask,
     ) -> bool:
         """Whether somebody, ``(h, w)`` bool, goes on as the room along most of where he meets it.
 
@@ -299,9 +296,9 @@ class Room:
 
     def going_on(
         self,
-        depth: DepthArray,
+        depth: Floats,
         surfaces: Surfaces,
-        large: npt.NDArray[np.bool_],
+        large: Mask,
         k: Intrinsics,
         dt: float,
     ) -> GoingOn:
@@ -338,7 +335,7 @@ class Room:
 
     def update(
         self,
-        depth: DepthArray,
+        depth: Floats,
         dt: float,
         somebody: Mask | None,
         surfaces: Surfaces,
@@ -409,9 +406,9 @@ class Room:
     def _taken(
         self,
         open_: npt.NDArray[np.intp],
-        depth: DepthArray,
+        depth: Floats,
         dt: float,
-        allowed: DepthArray,
+        allowed: Floats,
         known: Mask,
         nearer: Mask,
         surfaces: Surfaces,
@@ -452,9 +449,7 @@ class Room:
         np.put(self._front, open_[stays], now[stays])
         return taken
 
-    def _settle(
-        self, depth: DepthArray, dt: float, allowed: DepthArray, somebody: Mask | None
-    ) -> None:
+    def _settle(self, depth: Floats, dt: float, allowed: Floats, somebody: Mask | None) -> None:
         still = self.before & (np.abs(depth - self._still) <= np.float32(0.5) * allowed)
         if somebody is not None:
             still &= ~somebody

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image, Mask
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
@@ -75,16 +74,16 @@ class Scene:
 
     view: DepthView
     floor: Floor | None
-    elevation: npt.NDArray[np.float32] | None
-    forward: npt.NDArray[np.float32]
+    elevation: Floats | None
+    forward: Floats
     axes: FloatArray
-    standing: npt.NDArray[np.bool_]
-    before: npt.NDArray[np.bool_]
-    still: npt.NDArray[np.bool_]
-    vacant: npt.NDArray[np.bool_]
+    standing: Mask
+    before: Mask
+    still: Mask
+    vacant: Mask
     surfaces: Surfaces
     rim: Rim
-    image: npt.NDArray[np.uint8]
+    image: Image
     codes: ColorCodes
     motion: Pose | Lost | None
     way: Pose | Lost | None
@@ -99,7 +98,7 @@ class Scene:
         return Sizes.of(self.surfaces, self.view.intrinsics)
 
     @cached_property
-    def large(self) -> npt.NDArray[np.bool_]:
+    def large(self) -> Mask:
         """For each surface whether it is larger than anybody."""
         return larger_than_anybody(self.sizes)
 
@@ -359,7 +358,7 @@ class SceneReader:
         return self.room.goes_on(mask, scene.view.depth, scene.surfaces, scene.large)
 
     def _move(
-        self, image: npt.NDArray[np.uint8], view: DepthView, now: Pose | None, seconds: float
+        self, image: Image, view: DepthView, now: Pose | None, seconds: float
     ) -> Pose | Lost | None:
         """How the camera has moved: by its poses where both frames have one, else as it seems."""
         last = self._pose
@@ -378,20 +377,18 @@ class SceneReader:
         return moved
 
 
-def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim, large: npt.NDArray[np.bool_]) -> Mask:
+def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim, large: Mask) -> Mask:
     """Pixels, ``(h, w)`` bool, of surfaces that are not ``large`` and go on beside the view."""
     left, width = surfaces.boxes[:, 0], surfaces.boxes[:, 2]
     beyond = (left <= 1 + rim.left) | (left + width >= view.shape[1] - 1 - rim.right)
     beyond &= ~large
     beyond[0] = False
-    mask: Mask = beyond[surfaces.labels]
-    return mask
+    return beyond[surfaces.labels]
 
 
-def larger_than_anybody(sizes: Sizes) -> npt.NDArray[np.bool_]:
+def larger_than_anybody(sizes: Sizes) -> Mask:
     """Which surfaces are, ``(n,)`` bool."""
-    large: npt.NDArray[np.bool_] = (sizes.width > WIDTH[1]) | (sizes.height > HEIGHT[1])
-    return large
+    return (sizes.width > WIDTH[1]) | (sizes.height > HEIGHT[1])
 
 
 def _stands(moved: Pose) -> bool:

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Mask
+from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
 NEARER = 0.1
@@ -121,7 +120,7 @@ class Silhouette:
         mask[self.rows, self.cols] = self.mask
         return mask
 
-    def highest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
+    def highest(self, elevation: Floats | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
 
         Args:
@@ -131,7 +130,7 @@ class Silhouette:
             return None
         return _upper_end(elevation[self.rows, self.cols][self.mask])
 
-    def lowest(self, elevation: npt.NDArray[np.float32] | None) -> float | None:
+    def lowest(self, elevation: Floats | None) -> float | None:
         """Metres above the floor of the lower end, None where no floor is known; see `highest`."""
         if elevation is None:
             return None
@@ -229,7 +228,7 @@ class Silhouette:
         return cls.of(view, left + int(cols[0]), top + int(rows[0]), part, 0, rim)
 
 
-def _upper_end(values: npt.NDArray[np.float32]) -> float:
+def _upper_end(values: Floats) -> float:
     """The 98th percentile of ``(n,)``: ``np.percentile`` takes five times as long."""
     place = UPPER * (len(values) - 1)
     low = int(place)

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Mask
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 
@@ -32,7 +32,7 @@ class Runs:
     label: npt.NDArray[np.int32]
     count: int
 
-    def sums(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    def sums(self, values: Floats) -> FloatArray:
         """Sum over each label of an image, ``(h, w)``; ``(count,)``."""
         of_runs = np.add.reduceat(values.ravel(), self.start)
         return np.asarray(np.bincount(self.label, of_runs, self.count), np.float64)
@@ -54,7 +54,7 @@ class Surfaces:
     labels: npt.NDArray[np.int32]
     boxes: npt.NDArray[np.int32]
     pixels: npt.NDArray[np.int32]
-    depth: npt.NDArray[np.float32]
+    depth: Floats
     jump: float
     jump_per_metre: float
     runs: Runs
@@ -62,32 +62,30 @@ class Surfaces:
     def __len__(self) -> int:
         return len(self.pixels)
 
-    def areas(self, k: Intrinsics) -> npt.NDArray[np.float64]:
+    def areas(self, k: Intrinsics) -> FloatArray:
         """Square metres of each surface as seen from a camera, ``(n,)``."""
         z = self.depth.astype(np.float64)
-        result: npt.NDArray[np.float64] = self.pixels * z * z / (k.fx * k.fy)
-        return result
+        return self.pixels * z * z / (k.fx * k.fy)
 
     def crop(self, label: int) -> tuple[int, int, Mask]:
         """Left and top of one surface, and which pixels right and below of there are of it."""
         left, top, width, height = self.boxes[label].tolist()
         return left, top, self.labels[top : top + height, left : left + width] == label
 
-    def means(self, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    def means(self, values: Floats) -> FloatArray:
         """Mean over each surface of an image, ``(h, w)``; ``(n,)``, 0 where there is no pixel."""
-        result: npt.NDArray[np.float64] = self.runs.sums(values) / np.maximum(self.pixels, 1)
-        return result
+        return self.runs.sums(values) / np.maximum(self.pixels, 1)
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
     """Places and sizes of all surfaces in metres, seen from the camera, ``(n,)`` each."""
 
-    area: npt.NDArray[np.float64]
-    x: npt.NDArray[np.float64]
-    y: npt.NDArray[np.float64]
-    width: npt.NDArray[np.float64]
-    height: npt.NDArray[np.float64]
+    area: FloatArray
+    x: FloatArray
+    y: FloatArray
+    width: FloatArray
+    height: FloatArray
 
     @classmethod
     def of(cls, surfaces: Surfaces, k: Intrinsics) -> Sizes:
@@ -103,9 +101,7 @@ class Sizes:
         )
 
 
-def standing(
-    view: DepthView, elevation: npt.NDArray[np.float32] | None, margin: float
-) -> npt.NDArray[np.bool_]:
+def standing(view: DepthView, elevation: Floats | None, margin: float) -> Mask:
     """Pixels with a reading that do not belong to the floor, ``(h, w)`` bool.
 
     Args:
@@ -121,8 +117,8 @@ def standing(
 
 
 def surfaces_in(
-    depth: npt.NDArray[np.float32],
-    mask: npt.NDArray[np.bool_],
+    depth: Floats,
+    mask: Mask,
     jump: float,
     jump_per_metre: float,
 ) -> Surfaces:
@@ -148,7 +144,7 @@ def surfaces_in(
 def _measured(
     labels: npt.NDArray[np.int32],
     count: int,
-    depth: npt.NDArray[np.float32],
+    depth: Floats,
     jump: float,
     jump_per_metre: float,
 ) -> Surfaces:

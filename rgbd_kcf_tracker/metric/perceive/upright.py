@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
@@ -155,15 +154,15 @@ class UprightPeople:
             a child of seven and higher than furniture: of what stands in a room, little else is.
     """
 
-    mask: npt.NDArray[np.bool_]
-    tall: npt.NDArray[np.bool_]
+    mask: Mask
+    tall: Mask
 
 
 def upright_people(
     view: DepthView,
     surfaces: Surfaces,
-    elevation: npt.NDArray[np.float32] | None,
-    forward: npt.NDArray[np.float32],
+    elevation: Floats | None,
+    forward: Floats,
     right: FloatArray,
     rim: Rim,
     whole: bool = False,
