@@ -21,8 +21,8 @@ from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.fading import Lately, about, around, fading
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, grown
+from rgbd_kcf_tracker.metric.perceive.fading import ABOUT, Lately, around, fading
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, _low
 from rgbd_kcf_tracker.metric.perceive.paint import DIFFERS, Paint
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE, Room, tolerance
@@ -328,7 +328,7 @@ def test_who_shows_less_than_before_fades(area: float, missed: bool, hard: float
     else:
         assert np.array_equal(where, seen.in_view(depth.shape))
         assert around([lately]) == np.s_[20:120, 50:90]
-        assert about(where).sum() == 104 * 44
+        assert grown(where, ABOUT).sum() == 104 * 44
 
 
 def test_who_is_half_as_high_as_he_stands_is_not_compared_with_that():

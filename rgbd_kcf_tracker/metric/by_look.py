@@ -30,7 +30,7 @@ from rgbd_kcf_tracker.metric.identity.scale_filter import SCALE_STEP, ScaleFilte
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.backdrop import Backdrop
 from rgbd_kcf_tracker.metric.perceive.colors import view_image
-from rgbd_kcf_tracker.metric.perceive.depth_view import median_depth
+from rgbd_kcf_tracker.metric.perceive.depth_view import grown, median_depth
 
 LARGE_STEP = 0.08
 """Seconds between frames in which a target may leave the window, and from which other places are
@@ -392,8 +392,7 @@ class ByLook:
         depth = np.where(is_reading(depth), depth, np.float32(np.nan))
         off = np.abs(depth - np.float32(self._depth))
         near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
-        about: Mask = cv2.dilate(near.view(np.uint8), np.ones((3, 3), np.uint8)).view(np.bool_)
-        return about
+        return grown(near)
 
     def _box_at(self, sighting: Sighting) -> Box:
         return Box.from_center(sighting.cx, sighting.cy, *self._size)

@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.metric.identity.person import COAST, FALLS, TRAVELLED, Per
 from rgbd_kcf_tracker.metric.perceive.fading import Lately
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
-from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette, together
 from rgbd_kcf_tracker.metric.perceive.upright import HEADED
 
 SMALL = 0.1
@@ -370,12 +370,8 @@ class Account:
 
     def somebody(self) -> Mask:
         """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
-        mask = np.zeros(self.scene.view.shape, np.bool_)
-        for person, index in self.in_view.items():
-            if person.alive:
-                seen = self.sights[index].figure.seen
-                mask[seen.rows, seen.cols] |= seen.mask
-        return mask
+        seen = (self.sights[n].figure.seen for p, n in self.in_view.items() if p.alive)
+        return together(seen, self.scene.view.shape)
 
 
 def look_of(scene: Scene, seen: Silhouette) -> View:

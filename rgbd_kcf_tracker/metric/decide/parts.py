@@ -84,7 +84,7 @@ class Parts:
         """How many of a silhouette's pixels are of each kind."""
         counts = self._counts.get(seen)
         if counts is None:
-            counts = self.counted(self.kinds[seen.rows, seen.cols][seen.mask])
+            counts = self.counted(seen.pixels(self.kinds))
             self._counts[seen] = counts
         return counts
 

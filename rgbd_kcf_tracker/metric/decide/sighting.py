@@ -70,8 +70,7 @@ def learn_sighting(
     # Before the room is known anything may seem to stand before it, but not walk.
     known = account.settled or person.travelled > TRAVELLED
     if known and not person.mobile and seen.area > WHOLE:
-        before = account.scene.before[seen.rows, seen.cols][seen.mask]
-        person.mobile = bool(before.mean() > 1 - PART_OF_ROOM)
+        person.mobile = bool(seen.pixels(scene.before).mean() > 1 - PART_OF_ROOM)
     view = account.look(seen)
     all_sides = len(person.gallery.views) > ALL_SIDES
     if index >= 0 and row < len(account.odds):
@@ -109,8 +108,7 @@ def learn_sighting(
 
 def has_come(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette has come to where it is, and did not stand behind somebody before."""
-    vacant = scene.vacant[seen.rows, seen.cols][seen.mask]
-    return float(vacant.mean()) > VACANT and came(scene, seen)
+    return seen.pixels(scene.vacant).mean() > VACANT and came(scene, seen)
 
 
 def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:

@@ -49,7 +49,7 @@ def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
         if not near:
             continue
         seen = scene.silhouette(label)
-        before = scene.before[seen.rows, seen.cols][seen.mask]
+        before = seen.pixels(scene.before)
         if np.count_nonzero(before) >= MOST * len(before):
             continue  # seen as a figure anyway
         view = look_of(scene, seen)

@@ -10,7 +10,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import Image, Mask
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import in_box, part_in
 
 MIDDLE = 0.6
 """Share of a box's sides that is looked at: at its rim other things show."""
@@ -39,7 +39,7 @@ class Elsewhere:
 
     def keep(self, image: Image, box: Box) -> None:
         """Take a picture, ``(h, w, 3)`` uint8 BGR, and where the target is in it, in its pixels."""
-        self._kept = [*self._kept[:1], (image, ~_inside(image, box))]
+        self._kept = [*self._kept[:1], (image, ~in_box(image.shape, box))]
         self._refused = []
 
     def refuse(self, image: Image, box: Box) -> None:
@@ -49,7 +49,7 @@ class Elsewhere:
             image: ``(h, w, 3)`` uint8 BGR.
             box: in its pixels.
         """
-        self._refused = [(image, _inside(image, box))]
+        self._refused = [(image, in_box(image.shape, box))]
 
     def forget(self) -> None:
         """Drop all: the camera has moved."""
@@ -65,13 +65,6 @@ class Elsewhere:
         part = part_in(image.shape, box.scaled(MIDDLE))
         pictures = self._kept + self._refused
         return any(_same(image, then, part, there) for then, there in pictures)
-
-
-def _inside(image: Image, box: Box) -> Mask:
-    """Which pixels of a picture a box covers, ``(h, w)`` bool."""
-    inside = np.zeros(image.shape[:2], np.bool_)
-    inside[part_in(image.shape, box)] = True
-    return inside
 
 
 def _same(now: Image, then: Image, part: tuple[slice, slice], there: Mask) -> bool:

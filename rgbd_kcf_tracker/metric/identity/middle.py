@@ -256,7 +256,7 @@ def _middle(view: DepthView, seen: Silhouette) -> FloatArray:
     count = float(columns.sum())
     row = seen.top + float(rows @ np.arange(len(rows))) / count
     column = seen.left + float(columns @ np.arange(len(columns))) / count
-    depth = view.depth[seen.rows, seen.cols][seen.mask]
+    depth = seen.pixels(view.depth)
     half, most = len(depth) // 2, int(0.9 * (len(depth) - 1))
     ordered = np.partition(depth, (half, most))
     surface, back = float(ordered[half]), float(ordered[most])

@@ -201,7 +201,7 @@ class Person:
         self.misses += 1
         if self.last is None or not self.hidden:
             return
-        there = depth[self.last.rows, self.last.cols][self.last.mask]
+        there = self.last.pixels(depth)
         past = int(np.count_nonzero(there > self.last.depth + BEYOND))
         self.hidden = past < EMPTY * len(there)
         if not self.hidden:  # what goes away is no furniture

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import grown, in_box, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import (
     CREPT,
     LEAST_CORNERS,
@@ -90,7 +90,6 @@ LEAPT = 0.6
 stands still, but has leapt: at 10 Hz nobody is behind a door's post in less than two."""
 AS_LARGE = 1.3
 """Times, or parts of, the target's area of a piece that may be the target that has leapt."""
-_ROUND = np.ones((3, 3), np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +149,7 @@ class Backdrop:
         self._same, self._same_for = np.zeros(shape, np.uint8), np.zeros(shape, np.float32)
         self._area = self._may_part = 0
         self.met = False
-        self._mine = self._within(box.scaled(MARGIN))
+        self._mine = in_box(image.shape, box.scaled(MARGIN))
         self._anchor, self._unasked = gray, 0.0
 
     def see(self, image: Image, box: Box, dt: float) -> None:
@@ -163,8 +162,12 @@ class Backdrop:
         """
         gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
         self.met = False
-        around = self._within(box.scaled(MARGIN)) if image.shape == self._last.shape else None
-        if around is None or self._camera_moved(gray, ~around) or self._crept(gray, ~around, dt):
+        around = in_box(image.shape, box.scaled(MARGIN))
+        if (
+            image.shape != self._last.shape
+            or self._camera_moved(gray, ~around)
+            or self._crept(gray, ~around, dt)
+        ):
             self._start(image, gray, box)
             return
         self._same += self._same < 255
@@ -229,7 +232,7 @@ class Backdrop:
         if self.met:
             return None
         self._mine[:] = False
-        self._mine[part] = _grown(body)
+        self._mine[part] = grown(body)
         end = _ended(bounds, b, known)
         told = body & differs
         columns = np.count_nonzero(told, axis=0)
@@ -265,8 +268,8 @@ class Backdrop:
         was = int(np.count_nonzero(self._was))
         mine = self._pieces.overlap(self._was) > GOES_ON * np.minimum(areas, was)
         if not mine.any():
-            about = self._within(box.scaled(COMES_OUT))
-            covered = _grown(~self._known & about)
+            about = in_box(self._last.shape, box.scaled(COMES_OUT))
+            covered = grown(~self._known & about)
             mine = self._pieces.overlap(covered | (self._appeared & about)) > 0
             if self._share > LEAPT:
                 larger = areas / whole
@@ -288,7 +291,7 @@ class Backdrop:
 
     def _part_in_pieces(self, differs: Mask) -> None:
         """Part what differs into pieces, and carry over whose these are."""
-        before = _grown(self._differs)
+        before = grown(self._differs)
         pieces = self._pieces = _pieces(differs)
         self._differs = pieces.mask(pieces.areas > 0)
         others = pieces.overlap(self._others) > OTHERS * pieces.areas
@@ -299,18 +302,13 @@ class Backdrop:
 
     def _take(self, box: Box) -> Mask:
         """Learn what has not changed, but for what may be the target's; the latter is returned."""
-        within = self._within(box.scaled(MARGIN))
+        within = in_box(self._last.shape, box.scaled(MARGIN))
         mine = self._mine | within
         self._same[within] = self._same_for[within] = 0
         still = (self._same >= STABLE) & ~mine
         np.copyto(self._colors, self._last, where=still[:, :, None])
         self._known |= still
         return mine
-
-    def _within(self, box: Box) -> Mask:
-        mask = np.zeros(self._last.shape[:2], np.bool_)
-        mask[part_in(self._last.shape, box)] = True
-        return mask
 
     def _camera_moved(self, gray: Image, outside: Mask) -> bool:
         """Whether the camera has moved, or nothing tells that it has not."""
@@ -342,7 +340,7 @@ class Backdrop:
     def _meets(self, body: Mask, others: Mask) -> bool:
         """Whether a piece is the target and somebody else whom it has met."""
         area = int(np.count_nonzero(body))
-        if np.count_nonzero(body & _grown(others)) > OTHERS * area:
+        if np.count_nonzero(body & grown(others)) > OTHERS * area:
             self._may_part = PARTED
         if self._may_part and area > GROWN * self._area:
             return True
@@ -386,15 +384,10 @@ def _pieces(mask: Mask) -> _Pieces:
     return _Pieces(labels, areas, edge)
 
 
-def _grown(mask: Mask) -> Mask:
-    """A mask and the pixels beside it."""
-    grown: Mask = cv2.dilate(mask.astype(np.uint8), _ROUND) > 0
-    return grown
-
-
 def _closed(mask: Mask) -> Mask:
     """A mask without gaps of a pixel or two."""
-    closed: Mask = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, _ROUND) > 0
+    square = np.ones((3, 3), np.uint8)
+    closed: Mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, square).view(np.bool_)
     return closed
 
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import Floats
+from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
@@ -29,6 +30,19 @@ def part_in(shape: tuple[int, ...], box: Box) -> tuple[slice, slice]:
         slice(math.floor(min(max(box.y, 0), rows)), math.ceil(min(max(box.bottom, 0), rows))),
         slice(math.floor(min(max(box.x, 0), cols)), math.ceil(min(max(box.right, 0), cols))),
     )
+
+
+def in_box(shape: tuple[int, ...], box: Box) -> Mask:
+    """The pixels of an image that a box touches, ``(h, w)`` bool."""
+    inside = np.zeros(shape[:2], np.bool_)
+    inside[part_in(shape, box)] = True
+    return inside
+
+
+def grown(mask: Mask, side: int = 3) -> Mask:
+    """A mask and the squares of ``side`` pixels about each of its own, ``(h, w)`` bool."""
+    wider: Mask = cv2.dilate(mask.view(np.uint8), np.ones((side, side), np.uint8)).view(np.bool_)
+    return wider
 
 
 def median_depth(frame: Frame, box: Box) -> float:

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from rgbd_kcf_tracker.arrays import FloatArray, Image, Mask
 from rgbd_kcf_tracker.features.optical_flow import followed
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, grown
 from rgbd_kcf_tracker.pose import Pose
 
 Points = npt.NDArray[np.floating]
@@ -294,19 +294,17 @@ def _told(
     if stands(last, gray, first, second):
         return None
     motion = _agreed(first, second, last_view, seconds)
-    if motion is not None:  # or what moved is somebody, or too little of it is known yet
-        return motion if _bears_out(motion, first, second, last_view) else None
-    stood = int(np.count_nonzero(_stood(first, second)))
-    lost = Lost(surely=len(first) >= MANY and stood < HARDLY * len(first))
-    # What has left the view is found anywhere, and from there nothing leads back.
-    back, found = followed(gray, last, second.astype(np.float32))
-    leads = found & (np.abs(back - first).max(axis=1) < AGREE)
-    first, second = first[leads], second[leads]
-    if len(first) < LEAST_CORNERS:
-        return lost
-    motion = _agreed(first, second, last_view, seconds)
     if motion is None:
-        return lost
+        stood = int(np.count_nonzero(_stood(first, second)))
+        lost = Lost(surely=len(first) >= MANY and stood < HARDLY * len(first))
+        # What has left the view is found anywhere, and from there nothing leads back.
+        back, found = followed(gray, last, second.astype(np.float32))
+        leads = found & (np.abs(back - first).max(axis=1) < AGREE)
+        first, second = first[leads], second[leads]
+        motion = _agreed(first, second, last_view, seconds)
+        if motion is None:
+            return lost
+    # Else what moved is somebody, or too little of it is known yet.
     return motion if _bears_out(motion, first, second, last_view) else None
 
 
@@ -318,12 +316,11 @@ def _crept(anchor: _Anchor, gray: Image) -> Pose | None:
         return None
     found, good = followed(anchor.gray, gray, anchor.corners)
     first, second = anchor.corners[good].astype(np.float64), found[good].astype(np.float64)
-    if len(first) < LEAST_CORNERS or not _have_moved(_lengths(second - first) > CREEPS, first):
+    if not _have_moved(_lengths(second - first) > CREEPS, first):
         return None
     motion = _agreed(first, second, anchor.view, anchor.age)
-    if motion is None or not _bears_out(motion, first, second, anchor.view):
-        return None
-    return motion
+    agreed = motion is not None and _bears_out(motion, first, second, anchor.view)
+    return motion if agreed else None
 
 
 def _bears_out(motion: Pose, first: FloatArray, second: FloatArray, view: DepthView) -> bool:
@@ -361,10 +358,7 @@ def _share(which: Mask, corners: Points) -> float:
 
 def _usable(view: DepthView, others: Mask) -> Mask:
     """Pixels, ``(h, w)`` bool, that have depth and lie beside nothing that may move by itself."""
-    side = 2 * BESIDE + 1
-    about = cv2.dilate(others.view(np.uint8), np.ones((side, side), np.uint8)).view(np.bool_)
-    usable: Mask = (view.depth > 0) & ~about
-    return usable
+    return (view.depth > 0) & ~grown(others, 2 * BESIDE + 1)
 
 
 def _lengths(steps: FloatArray) -> FloatArray:
@@ -399,6 +393,8 @@ def _agreed(first: FloatArray, second: FloatArray, view: DepthView, seconds: flo
         view: the depth before.
         seconds: between the two.
     """
+    if len(first) < LEAST_CORNERS:
+        return None
     points, k = _points(first, view), view.intrinsics
     starts = [np.zeros(3)]
     right, down = np.median(second - first, axis=0).tolist()

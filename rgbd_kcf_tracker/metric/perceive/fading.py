@@ -13,11 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import Mask
-from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette, together
 
 STEP = 0.5
 """Seconds from one frame to the next at the most: in more nobody is where he was."""
@@ -73,15 +72,4 @@ def fading(lately: Sequence[Lately], hardly: Mask) -> Mask | None:
         hardly: see :meth:`Lately.fades`.
     """
     who = [each.seen for each in lately if each.fades(hardly)]
-    if not who:
-        return None
-    mask = np.zeros(hardly.shape, np.bool_)
-    for seen in who:
-        mask[seen.rows, seen.cols] |= seen.mask
-    return mask
-
-
-def about(mask: Mask) -> Mask:
-    """A mask and what is so near to it that it may be there in the next frame, ``(h, w)`` bool."""
-    grown: Mask = cv2.dilate(mask.view(np.uint8), np.ones((ABOUT, ABOUT), np.uint8)).view(np.bool_)
-    return grown
+    return together(who, hardly.shape) if who else None

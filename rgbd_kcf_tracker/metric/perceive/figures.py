@@ -249,7 +249,7 @@ def place_of(scene: Scene, seen: Silhouette) -> FloatArray:
     """Where a silhouette is, ``(2,)`` metres across and along the floor."""
     left, top, right, bottom = seen.metres
     middle = np.array([(left + right) / 2, (top + bottom) / 2, seen.depth])
-    ahead = float(scene.forward[seen.rows, seen.cols][seen.mask].mean())
+    ahead = float(seen.pixels(scene.forward).mean())
     return np.array([scene.axes[0] @ middle, ahead])
 
 

@@ -10,8 +10,6 @@ still and belongs to nobody becomes part of the room.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -143,20 +141,6 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
     result: Mask = (goes_on > MOST * meets) & (before <= of_it)
     result[0] = False
     return result
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GoingOn:
-    """What goes on from somebody as one surface: pixels of a view.
-
-    Attributes:
-        somebody: ``(h, w)`` bool, what may be he.
-        beyond: ``(h, w)`` bool, what is farther from his middle than anybody reaches: something, or
-            somebody else, that he touches.
-    """
-
-    somebody: Mask
-    beyond: Mask
 
 
 class Room:
@@ -301,7 +285,7 @@ class Room:
         large: Mask,
         k: Intrinsics,
         dt: float,
-    ) -> GoingOn:
+    ) -> tuple[Mask, Mask]:
         """What may be somebody as it goes on as one surface from what stands before the room.
 
         Args:
@@ -310,6 +294,10 @@ class Room:
             large: ``(n,)`` bool, those of them that nobody can be.
             k: of the view.
             dt: seconds since the last.
+
+        Returns:
+            ``(h, w)`` bool each: the pixels that may be somebody; and those farther from his middle
+            than anybody reaches, of something, or somebody else, that he touches.
         """
         valid, known, count = depth > 0, self.depth > 0, len(surfaces)
         # Where somebody stood, what is far behind him is not he.
@@ -331,7 +319,7 @@ class Room:
         far = large[label] & (np.abs(columns - middle[label]) * depth[rows, columns] > REACH * k.fx)
         beyond = np.zeros_like(somebody)
         beyond[rows[far], columns[far]] = True
-        return GoingOn(somebody & ~beyond, beyond)
+        return somebody & ~beyond, beyond
 
     def update(
         self,

@@ -16,9 +16,9 @@ from rgbd_kcf_tracker.arrays import FloatArray, Floats, Image, Mask
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes, view_image
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, grown
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost
-from rgbd_kcf_tracker.metric.perceive.fading import STEP, Lately, about, around, fading
+from rgbd_kcf_tracker.metric.perceive.fading import ABOUT, STEP, Lately, around, fading
 from rgbd_kcf_tracker.metric.perceive.floor import Floor, FloorFinder
 from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.paint import Paint
@@ -244,7 +244,7 @@ class SceneReader:
         hardly, part = np.zeros_like(unlike), around(lately)
         hardly[part] = unlike[part] & self.room.hardly(view.depth, part)
         faded = fading(lately, hardly)
-        return None if faded is None else unlike & about(faded)
+        return None if faded is None else unlike & grown(faded, ABOUT)
 
     def _level_after(
         self, floor: Floor | None, view: DepthView, motion: Pose | Lost | None
@@ -296,18 +296,7 @@ class SceneReader:
         learns: bool,
         closer: Mask | None,
     ) -> None:
-        """Show the room a view.
-
-        Args:
-            view: the depth.
-            surfaces: of it.
-            rim: where depth ends.
-            upright: tells who in it is a person by his shape alone.
-            motion: of the camera.
-            seconds: since the last.
-            learns: whether the room is learned from it.
-            closer: see :meth:`Room.update`.
-        """
+        """Show the room a view; ``upright`` tells who in it is a person by his shape alone."""
         begins = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if begins or not self._begun:
             # A camera that warms up sends images without readings: people come with the first.
@@ -320,13 +309,15 @@ class SceneReader:
             unknown = self.room.moved(motion, view.intrinsics)
             people = upright(True)
             large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
-            going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
-            opened = (people.mask | going_on.somebody) & unknown
+            goes_on, beyond = self.room.going_on(
+                view.depth, surfaces, large, view.intrinsics, seconds
+            )
+            opened = (people.mask | goes_on) & unknown
             opened |= self.room.passing(people.tall, view.depth, surfaces)
             self.room.open(opened, view.depth)
             # Whose other side comes into view next may be somebody or something, and so may
             # be what somebody touches.
-            undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
+            undecided = _at_side(view, surfaces, rim, large) | beyond
             self._light.restart()
             somebody = None
         self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided, closer)
@@ -371,8 +362,8 @@ class SceneReader:
             self._pose = now
             return seems
         moved = last.after(now.inverse)
-        if _stands(moved):  # what it creeps counts from where it stood
-            return None
+        if moved.turn < STILL_TURN and moved.shift < STILL:
+            return None  # what it creeps counts from where it stood
         self._pose = now
         return moved
 
@@ -389,8 +380,3 @@ def _at_side(view: DepthView, surfaces: Surfaces, rim: Rim, large: Mask) -> Mask
 def larger_than_anybody(sizes: Sizes) -> Mask:
     """Which surfaces are, ``(n,)`` bool."""
     return (sizes.width > WIDTH[1]) | (sizes.height > HEIGHT[1])
-
-
-def _stands(moved: Pose) -> bool:
-    """Whether a camera's pose is that of a camera that stands still."""
-    return moved.turn < STILL_TURN and moved.shift < STILL

@@ -5,15 +5,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from operator import or_
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Mask
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, grown
+
+Scalar = TypeVar('Scalar', bound=np.generic)
 
 NEARER = 0.1
 NEARER_PER_METRE = 0.03
@@ -27,7 +31,6 @@ CUT_SHARE = 0.3
 0.21 everyone's MOTA was 1.6 points lower, at 0.42 walks at 1 Hz were (docs/experiments.md)."""
 UPPER = 0.98
 """Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
-_SEAM = np.ones((3, 3), np.uint8)
 
 
 class Rim(NamedTuple):
@@ -114,11 +117,13 @@ class Silhouette:
         """At which sides it reaches the end of what the camera sees."""
         return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
 
+    def pixels(self, image: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
+        """Those of an image of the view's shape that it covers, ``(n,)``."""
+        return image[self.rows, self.cols][self.mask]
+
     def in_view(self, shape: tuple[int, int]) -> Mask:
         """Its pixels in a view of a shape, ``(h, w)`` bool."""
-        mask = np.zeros(shape, np.bool_)
-        mask[self.rows, self.cols] = self.mask
-        return mask
+        return together([self], shape)
 
     def highest(self, elevation: Floats | None) -> float | None:
         """Metres above the floor of the upper end, None where no floor is known.
@@ -126,15 +131,11 @@ class Silhouette:
         Args:
             elevation: ``(h, w)`` of the view, metres, or None.
         """
-        if elevation is None:
-            return None
-        return _upper_end(elevation[self.rows, self.cols][self.mask])
+        return None if elevation is None else _upper_end(self.pixels(elevation))
 
     def lowest(self, elevation: Floats | None) -> float | None:
         """Metres above the floor of the lower end, None where no floor is known; see `highest`."""
-        if elevation is None:
-            return None
-        return -_upper_end(-elevation[self.rows, self.cols][self.mask])
+        return None if elevation is None else -_upper_end(-self.pixels(elevation))
 
     def same(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view has the same pixels."""
@@ -228,6 +229,14 @@ class Silhouette:
         return cls.of(view, left + int(cols[0]), top + int(rows[0]), part, 0, rim)
 
 
+def together(those: Iterable[Silhouette], shape: tuple[int, ...]) -> Mask:
+    """The pixels of some in a view of a shape, ``(h, w)`` bool."""
+    mask = np.zeros(shape, np.bool_)
+    for seen in those:
+        mask[seen.rows, seen.cols] |= seen.mask
+    return mask
+
+
 def _upper_end(values: Floats) -> float:
     """The 98th percentile of ``(n,)``: ``np.percentile`` takes five times as long."""
     place = UPPER * (len(values) - 1)
@@ -255,8 +264,7 @@ def _hidden_sides(view: DepthView, left: int, top: int, mask: Mask, z: float) ->
     outside = ~body
     nearer &= outside
     # Between two surfaces there often is a seam without a reading.
-    nearer = cv2.dilate(nearer.view(np.uint8), _SEAM).view(np.bool_)
-    nearer &= outside
+    nearer = grown(nearer) & outside
 
     def hidden(to: tuple[slice, slice], of: tuple[slice, slice]) -> bool:
         """Along the side on which the pixels ``to`` lie beyond those ``of`` the body."""

@@ -19,26 +19,6 @@ _BESIDE = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Runs:
-    """The pixels of a view in runs of one label in a row: one for some ten pixels.
-
-    Attributes:
-        start: ``(m,)`` index of each run's first pixel in the flattened view.
-        label: ``(m,)`` int32.
-        count: of labels.
-    """
-
-    start: npt.NDArray[np.intp]
-    label: npt.NDArray[np.int32]
-    count: int
-
-    def sums(self, values: Floats) -> FloatArray:
-        """Sum over each label of an image, ``(h, w)``; ``(count,)``."""
-        of_runs = np.add.reduceat(values.ravel(), self.start)
-        return np.asarray(np.bincount(self.label, of_runs, self.count), np.float64)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Surfaces:
     """The surfaces of a view; row ``i`` of each array is the surface labelled ``i``, 0 is none.
 
@@ -48,7 +28,8 @@ class Surfaces:
         pixels: ``(n,)`` int32 number of pixels.
         depth: ``(n,)`` float32 mean depth in metres.
         jump, jump_per_metre: the depth step at which they were cut.
-        runs: of pixels of one label in a row.
+        runs: ``(m,)`` index of the first pixel, in the flattened view, of each run of pixels of one
+            label in a row: of some ten pixels each.
     """
 
     labels: npt.NDArray[np.int32]
@@ -57,7 +38,7 @@ class Surfaces:
     depth: Floats
     jump: float
     jump_per_metre: float
-    runs: Runs
+    runs: npt.NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -74,7 +55,7 @@ class Surfaces:
 
     def means(self, values: Floats) -> FloatArray:
         """Mean over each surface of an image, ``(h, w)``; ``(n,)``, 0 where there is no pixel."""
-        return self.runs.sums(values) / np.maximum(self.pixels, 1)
+        return _means(values, self.labels, self.runs, self.pixels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,21 +119,8 @@ def surfaces_in(
     keep &= mask
     # Diagonal neighbours across a removed pixel must not join: 4-connectivity.
     count, labels = cv2.connectedComponents(keep.view(np.uint8), connectivity=4, ltype=cv2.CV_32S)
-    return _measured(labels, count, depth, jump, jump_per_metre)
-
-
-def _measured(
-    labels: npt.NDArray[np.int32],
-    count: int,
-    depth: Floats,
-    jump: float,
-    jump_per_metre: float,
-) -> Surfaces:
-    """Boxes, pixels and mean depth of ``count`` labels.
-
-    By runs: OpenCV's own statistics of connected components, and the sums of depth, go from pixel
-    to pixel and take twice as long.
-    """
+    # By runs: OpenCV's own statistics of connected components, and the sums of depth, go from pixel
+    # to pixel and take twice as long.
     width = labels.shape[1]
     flat = labels.ravel()
     ends = np.empty(flat.size, np.bool_)
@@ -161,10 +129,8 @@ def _measured(
     stop = np.flatnonzero(ends) + 1
     start = np.concatenate(([0], stop[:-1]))
     label = flat[start]
-    runs = Runs(start, label, count)
     row, left = np.divmod(start, width)
     right = left + (stop - start)
-    pixels = np.bincount(label, stop - start, count)
     boxes = np.zeros((count, 4), np.int32)
     first, last = np.full(count, width), np.zeros(count, np.intp)
     np.minimum.at(first, label, left)
@@ -173,12 +139,17 @@ def _measured(
     boxes[label[::-1], 1] = row[::-1]  # rows ascend, and the last that is written stays
     boxes[label, 3] = row + 1
     boxes[:, 3] -= boxes[:, 1]
-    return Surfaces(
-        labels,
-        boxes,
-        pixels.astype(np.int32),
-        (runs.sums(depth) / np.maximum(pixels, 1)).astype(np.float32),
-        jump,
-        jump_per_metre,
-        runs,
-    )
+    pixels = np.bincount(label, stop - start, count).astype(np.int32)
+    means = _means(depth, labels, start, pixels).astype(np.float32)
+    return Surfaces(labels, boxes, pixels, means, jump, jump_per_metre, start)
+
+
+def _means(
+    values: Floats,
+    labels: npt.NDArray[np.int32],
+    runs: npt.NDArray[np.intp],
+    pixels: npt.NDArray[np.int32],
+) -> FloatArray:
+    """See :meth:`Surfaces.means`."""
+    sums = np.add.reduceat(values.ravel(), runs)
+    return np.bincount(labels.ravel()[runs], sums, len(pixels)) / np.maximum(pixels, 1)

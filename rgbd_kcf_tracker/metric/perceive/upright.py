@@ -17,8 +17,8 @@ from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
-from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
+from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette, together
+from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces
 
 HEIGHT = (0.6, 2.1)
 """Metres from the head down to what shows: half of a small person to all of a tall one."""
@@ -180,16 +180,14 @@ def upright_people(
             may be seen.
     """
     k = view.intrinsics
-    z = surfaces.depth.astype(np.float64)
-    tall = surfaces.boxes[:, 3] * z / k.fy
-    wide = surfaces.boxes[:, 2] * z / k.fx
+    sizes = Sizes.of(surfaces, k)
+    tall, wide = sizes.height, sizes.width
     possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
     possible[0] = False
     one = wide <= WIDTH[1]
     # Two chairs beside each other have two heads as well.
     several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
-    people = np.zeros(view.shape, np.bool_)
-    tall_ones = np.zeros(view.shape, np.bool_)
+    people, tall_ones = list[Silhouette](), list[Silhouette]()
     for label in np.flatnonzero(possible & (one | several)).tolist():
         left, upper, mask = surfaces.crop(label)
         found = []
@@ -198,21 +196,20 @@ def upright_people(
             found = [single] if upright(single, k, single.highest(elevation)) else []
         if not found and several[label]:
             parts = parted(view, forward, right, left, upper, mask)
-            parts = parts if len(parts) > 1 else []
             cut = [Silhouette.trimmed(view, left, upper, part, rim) for part in parts]
             found = [
                 part
                 for part in cut
-                if part is not None
+                if part is not None and len(cut) > 1
                 if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
         for seen in found:
             ends = seen.ends(view, rim)
             if whole and (ends.left or ends.right):
                 continue
-            people[seen.rows, seen.cols] |= seen.mask
+            people.append(seen)
             if one[label] and seen.height >= LENGTH[0]:
                 top = seen.highest(elevation)
                 if top is None or top > GROWN:
-                    tall_ones[seen.rows, seen.cols] |= seen.mask
-    return UprightPeople(people, tall_ones)
+                    tall_ones.append(seen)
+    return UprightPeople(together(people, view.shape), together(tall_ones, view.shape))
