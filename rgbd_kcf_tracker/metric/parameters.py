@@ -25,11 +25,7 @@ class MetricParameters(Parameters):
         0.04, 'Depth step between two surfaces.', unit='m', minimum=0.001, maximum=1.0
     )
     jump_per_metre: float = parameter(
-        0.03,
-        'Growth of the step with each metre of depth.',
-        unit='m/m',
-        minimum=0.0,
-        maximum=1.0,
+        0.03, 'Growth of the step with each metre of depth.', unit='m/m', minimum=0.0, maximum=1.0
     )
     floor_margin: float = parameter(
         0.05,
@@ -130,10 +126,7 @@ class MetricParameters(Parameters):
         maximum=1.0,
     )
     seen_ratio: float = parameter(
-        0.65,
-        'Response against its own mean from which it is seen again.',
-        minimum=0.0,
-        maximum=2.0,
+        0.65, 'Response against its own mean from which it is seen again.', minimum=0.0, maximum=2.0
     )
     embedding: str = parameter(
         '',

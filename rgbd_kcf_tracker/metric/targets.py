@@ -24,12 +24,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.follower import LEARNED, Follower
 from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.embedding import Embedding, Onnx
-from rgbd_kcf_tracker.metric.identity.middle import (
-    in_metres,
-    row_by_row,
-    sighted,
-    triple,
-)
+from rgbd_kcf_tracker.metric.identity.middle import in_metres, row_by_row, sighted, triple
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.figures import makes_figure

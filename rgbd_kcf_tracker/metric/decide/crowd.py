@@ -323,10 +323,7 @@ class Crowd:
             newcomer.again = newcomer.seen_before(new)
 
     def learn(
-        self,
-        account: Account,
-        targets: dict[int, Silhouette | None],
-        unsure: Collection[int] = (),
+        self, account: Account, targets: dict[int, Silhouette | None], unsure: Collection[int] = ()
     ) -> None:
         """Take what was seen.
 

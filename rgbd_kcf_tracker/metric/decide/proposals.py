@@ -105,8 +105,7 @@ def _split(
     beside = min(2 * expected.sigma[0] + 0.15, 0.5) + 0.65 * body.width
     above = min(2 * expected.sigma[1] + 0.15, 0.5)
     reach = Box.from_corners(
-        *view.place(x - beside, y - above, z),
-        *view.place(x + beside, y + body.height + above, z),
+        *view.place(x - beside, y - above, z), *view.place(x + beside, y + body.height + above, z)
     )
     part = part_in(view.shape, reach)
     depth = view.depth[part]
@@ -131,11 +130,7 @@ def _split(
 
 
 def _narrowed(
-    scene: Scene,
-    body: Body,
-    seen: Silhouette,
-    expected: Expectation,
-    others: Others,
+    scene: Scene, body: Body, seen: Silhouette, expected: Expectation, others: Others
 ) -> Silhouette | None:
     """The part of a too wide silhouette that most likely is the target, by colour and place."""
     k = scene.view.intrinsics

@@ -83,13 +83,7 @@ class ScaleFilter:
         return result
 
     def learn(
-        self,
-        color: Image,
-        cx: float,
-        cy: float,
-        width: float,
-        height: float,
-        rate: float,
+        self, color: Image, cx: float, cy: float, width: float, height: float, rate: float
     ) -> None:
         """Take one sample of the target, centred at ``cx, cy`` with that size in pixels."""
         spectrum = self._spectrum(color, cx, cy, width, height)

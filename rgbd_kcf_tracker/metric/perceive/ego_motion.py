@@ -128,11 +128,7 @@ class EgoMotion:
         self._since_crept = math.inf
 
     def update(
-        self,
-        image: Image,
-        view: DepthView,
-        others: Mask,
-        seconds: float,
+        self, image: Image, view: DepthView, others: Mask, seconds: float
     ) -> Pose | Lost | None:
         """The motion since the last view: the pose of the last camera's frame in that of now.
 
@@ -281,11 +277,7 @@ def upper_median(values: Image) -> int:
 
 
 def _told(
-    last: Image,
-    last_view: DepthView,
-    gray: Image,
-    others: Mask,
-    seconds: float,
+    last: Image, last_view: DepthView, gray: Image, others: Mask, seconds: float
 ) -> Pose | Lost | None:
     corners = corners_between(last, gray, _usable(last_view, others))
     if corners is None or len(corners[0]) < LEAST_CORNERS:

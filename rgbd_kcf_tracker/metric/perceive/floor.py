@@ -228,11 +228,7 @@ class FloorFinder:
         return self._floor
 
     def _searched(
-        self,
-        view: DepthView,
-        u: npt.NDArray[np.intp],
-        v: npt.NDArray[np.intp],
-        rays: FloatArray,
+        self, view: DepthView, u: npt.NDArray[np.intp], v: npt.NDArray[np.intp], rays: FloatArray
     ) -> Floor | None:
         k, z = view.intrinsics, rays[:, 2]
         inverse = np.full(view.shape, np.nan)

@@ -252,13 +252,7 @@ class Room:
         lost: Mask = unknown & ~opened
         return lost
 
-    def goes_on(
-        self,
-        somebody: Mask,
-        depth: Floats,
-        surfaces: Surfaces,
-        large: Mask,
-    ) -> bool:
+    def goes_on(self, somebody: Mask, depth: Floats, surfaces: Surfaces, large: Mask) -> bool:
         """Whether somebody, ``(h, w)`` bool, goes on as the room along most of where he meets it.
 
         Then he is part of it, and is taken into it.
@@ -279,12 +273,7 @@ class Room:
         return True
 
     def going_on(
-        self,
-        depth: Floats,
-        surfaces: Surfaces,
-        large: Mask,
-        k: Intrinsics,
-        dt: float,
+        self, depth: Floats, surfaces: Surfaces, large: Mask, k: Intrinsics, dt: float
     ) -> tuple[Mask, Mask]:
         """What may be somebody as it goes on as one surface from what stands before the room.
 

@@ -97,12 +97,7 @@ def standing(view: DepthView, elevation: Floats | None, margin: float) -> Mask:
     return valid
 
 
-def surfaces_in(
-    depth: Floats,
-    mask: Mask,
-    jump: float,
-    jump_per_metre: float,
-) -> Surfaces:
+def surfaces_in(depth: Floats, mask: Mask, jump: float, jump_per_metre: float) -> Surfaces:
     """Label the connected pixels of ``mask`` between which depth jumps by no more than allowed.
 
     Args:
