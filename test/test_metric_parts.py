@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.features.windows import resampled
 from rgbd_kcf_tracker.metric.by_look import ByLook
 from rgbd_kcf_tracker.metric.decide.evidence import WEIGHTS, probability
 from rgbd_kcf_tracker.metric.decide.parts import Others, Parts
-from rgbd_kcf_tracker.metric.identity.body import Body
+from rgbd_kcf_tracker.metric.identity.body import BANDS, Body, band_histograms, band_similarity
 from rgbd_kcf_tracker.metric.identity.color_posterior import ColorPosterior, rgb_codes
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
@@ -27,11 +27,6 @@ from rgbd_kcf_tracker.metric.identity.motion import MotionFilter
 from rgbd_kcf_tracker.metric.identity.patch import PatchFeatures
 from rgbd_kcf_tracker.metric.identity.scale_filter import ScaleFilter
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.color_bands import (
-    BANDS,
-    band_histograms,
-    band_similarity,
-)
 from rgbd_kcf_tracker.metric.perceive.colors import (
     CODES,
     TINTS,

@@ -76,18 +76,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """What the others in view say of a candidate.
-
-    Attributes:
-        look: log-odds that its look is the target's.
-        mine: log-odds, place and look together, that the figure which it is part of is the
-            target; 0 where it is part of none.
-        rival: log-odds that it is somebody else who was seen beside the target, at least 0:
-            somebody new is always possible.
-        assigned: 1 where its figure is explained as the target, -1 as somebody else, 0 as neither;
-            1 for a target that was no figure when it was last seen: nothing then objects.
-        room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
-    """
+    """What the others in view say of a candidate: see :class:`~.evidence.Evidence`."""
 
     look: float
     mine: float

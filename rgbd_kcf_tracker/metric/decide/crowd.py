@@ -150,11 +150,7 @@ class Crowd:
             if last is not None and last.same(seen):
                 again.chosen = True
                 return again
-        person = self.welcome(account.place(seen), account.time, chosen=True)
-        account.people.append(person)
-        if index >= 0:
-            account.owner[index] = len(account.people) - 1
-        self._see(account, len(account.people) - 1, seen, index)
+        person = self._welcome_as(account, seen, index, chosen=True)
         person.gallery.mixed = bool(rest)
         self._welcome_beside(account, person, rest)
         return person
@@ -172,10 +168,18 @@ class Crowd:
         for piece in beside:
             if self._new_at(account, piece, person) is not None:
                 continue
-            other = self.welcome(account.place(piece), account.time)
-            account.people.append(other)
-            self._see(account, len(account.people) - 1, piece, -1)
-            other.meet(person)
+            self._welcome_as(account, piece, -1).meet(person)
+
+    def _welcome_as(
+        self, account: Account, seen: Silhouette, index: int, chosen: bool = False
+    ) -> Person:
+        """Somebody new, who is a silhouette of the frame and the sight of that index, or -1."""
+        person, row = self.welcome(account.place(seen), account.time, chosen), len(account.people)
+        account.people.append(person)
+        if index >= 0:
+            account.owner[index] = row
+        self._see(account, row, seen, index)
+        return person
 
     def chosen_unseen(
         self, gallery: Gallery, place: FloatArray, left: float, met: Collection[int]
@@ -346,7 +350,10 @@ class Crowd:
                 continue
             index = account.figure_of(seen)
             if index >= 0:
-                self._merge(account, row, account.owner[index])
+                # The number under which it was known while it was not recognised.
+                double = account.stranger(person, index)
+                if double in self.people:
+                    self.forget(double)
                 account.owner[index] = row
             self._see(account, row, seen, index, person.number not in unsure)
         for column, sight in enumerate(account.sights):
@@ -357,14 +364,11 @@ class Crowd:
                 small = sight.figure.seen.area < NEW_AREA and not _is_head(account, column)
                 if small or sight.figure.low or _is_piece(account, column):
                     continue
-                account.owner[column] = len(people)
-                newcomer = self.welcome(sight.figure.place, time)
+                newcomer = self._welcome_as(account, sight.figure.seen, column)
                 newcomer.entered = sight.figure.seen.ends(account.scene.view, account.scene.rim).any
                 for other in people if account.scene.motion is None else ():
                     if other.seen_at < time and other.out_of_reach(newcomer.place, time):
                         other.meet(newcomer)
-                people.append(newcomer)
-                self._see(account, len(people) - 1, sight.figure.seen, column)
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
                 self._see(account, row, sight.figure.seen, column)
@@ -442,16 +446,6 @@ class Crowd:
         for each in beside:
             each.met.discard(person.number)
         return beside
-
-    def _merge(self, account: Account, row: int, other: int) -> None:
-        """Drop the number under which a target was known while it was not recognised."""
-        if other < 0 or other == row:
-            return
-        person, double = account.people[row], account.people[other]
-        if double.number in person.met or double.chosen:
-            return
-        if double in self.people:
-            self.forget(double)
 
     def _see(
         self, account: Account, row: int, seen: Silhouette, index: int, sure: bool = True

@@ -60,13 +60,15 @@ class Evidence:
             candidate that does not touch the image's edge; 0 for one that does.
         emerged: True where the candidate was first seen away from the image's edge: whoever does
             not come in from there was here before.
-        look: log-odds of its look by the target's gallery.
-        mine: log-odds that the figure which it is part of is the target, 0 where it is no figure.
-        rival: log-odds that it is somebody else, at least 0.
+        look: log-odds that its look is the target's.
+        mine: log-odds, place and look together, that the figure which it is part of is the target;
+            0 where it is part of none.
+        rival: log-odds that it is somebody else who was seen beside the target, at least 0:
+            somebody new is always possible.
         assigned: by the joint explanation of the frame, 1 where its figure is the target, -1 where
-            it is somebody else, 0 where it is somebody new or no figure; 1 for a target that is no
-            figure itself.
-        room: share of its pixels that stood still while the target was elsewhere.
+            it is somebody else, 0 where it is somebody new or no figure; 1 for a target that was no
+            figure when it was last seen: nothing then objects.
+        room: share of its pixels that stood still while the target was seen elsewhere, 0 to 1.
         more: what further cues say.
     """
 

@@ -107,26 +107,18 @@ class Appearance:
         self._rate = rate
         self._masked = masked
         self._share = np.float32(color_share)
-        self._inner, self._outer, self._near = (self._boxed(k) for k in (0.85, 1.15, 2.0))
-        self._core = self._cell_box(1.0)
-        self._reach = self._cell_box(1.1)
+        self._inner, self._outer, self._near = (
+            self._boxed(self._pixels, factor) for factor in (0.85, 1.15, 2.0)
+        )
+        self._core, self._reach = (self._boxed(cells, factor, 2.0) for factor in (1.0, 1.1))
         self.mean_peak = 0.0
         self.learn(color, box.cx, box.cy, 1.0, None)
         self.mean_peak = FIRST_PEAK * self.look(color, box.cx, box.cy, 1.0).peak
 
-    def _boxed(self, factor: float) -> Mask:
-        place = np.abs(np.arange(self._pixels) + 0.5 - self._pixels / 2)
-        across = place <= self._target[0] * factor / 2
-        down = place <= self._target[1] * factor / 2
-        inside: Mask = down[:, None] & across[None, :]
-        return inside
-
-    def _cell_box(self, factor: float) -> Mask:
-        place = np.abs(np.arange(self._cells) + 0.5 - self._cells / 2) * (
-            self._pixels / self._cells
-        )
-        across = place <= max(self._target[0] * factor / 2, 2.0)
-        down = place <= max(self._target[1] * factor / 2, 2.0)
+    def _boxed(self, count: int, factor: float, least: float = 0.0) -> Mask:
+        """The target in a window of ``(count, count)``, ``least`` pixels to each side or more."""
+        place = np.abs(np.arange(count) + 0.5 - count / 2) * (self._pixels / count)
+        across, down = (place <= max(side * factor / 2, least) for side in self._target)
         inside: Mask = down[:, None] & across[None, :]
         return inside
 

@@ -9,17 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray, Floats
-from rgbd_kcf_tracker.metric.perceive.color_bands import (
-    BANDS,
-    band_histograms,
-    band_similarity,
-    bands_of_rows,
-)
+from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, Codes, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
+BANDS = 4
+"""Horizontal bands of a body: about head, chest, hips and legs of a person."""
 GROW_TIME = 0.4
 SHRINK_TIME = 4.0
 """Seconds in which the size follows what is seen: arms go out fast and a side view does not make a
@@ -132,7 +128,8 @@ class Body:
             below = self._histograms(seen, codes, view, expected[1])
             if band_similarity(below, self._colors) > here:
                 y, y_sigma = float(expected[1]), y_sigma + 0.2 * self.height
-        sigma = np.hypot(WOBBLE, np.array([x_sigma, y_sigma, _depth_sigma(z)]))
+        z_sigma = DEPTH_SIGMA + DEPTH_SIGMA_PER_METRE * z
+        sigma = np.hypot(WOBBLE, np.array([x_sigma, y_sigma, z_sigma]))
         return Placed(np.array([x, y, z]), sigma, fraction)
 
     def _fraction(self, seen: Silhouette) -> float:
@@ -184,7 +181,7 @@ class Body:
             top: metres, of the body's upper edge.
         """
         row, rows = self._rows(seen, view, top)
-        band = bands_of_rows(codes.shape[0], row, rows)
+        band = _bands_of_rows(len(codes), row, rows)
         if self._odds is None:
             floor = np.float32(ODDS_FLOOR)
             odds = np.log((self._colors + floor) / (self._around + floor))
@@ -223,14 +220,14 @@ class Body:
     def learn_colors(
         self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float, dt: float | None
     ) -> None:
-        """Follow the colours of a silhouette; ``dt`` seconds since the last time, None at first.
+        """Follow the colours of a silhouette.
 
         Args:
             seen: the silhouette.
             codes: of the view's colours.
             view: the depth.
             top: metres, of the body's upper edge.
-            dt: seconds.
+            dt: seconds since the last time, None at first.
         """
         counts = self._histograms(seen, codes, view, top)
         rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
@@ -269,5 +266,40 @@ class Body:
         self._odds = None
 
 
-def _depth_sigma(z: float) -> float:
-    return DEPTH_SIGMA + DEPTH_SIGMA_PER_METRE * z
+def band_histograms(codes: Codes, mask: Mask, top: float, height: float) -> Floats:
+    """Smoothed counts of colour codes in each band, ``(BANDS, CODES)``.
+
+    Args:
+        codes: ``(h, w)`` of the crop around the silhouette.
+        mask: ``(h, w)`` bool, the silhouette.
+        top: row of the crop in which the whole body begins (may be outside the crop).
+        height: rows of the whole body.
+    """
+    index = (codes + (_bands_of_rows(len(codes), top, height) * CODES)[:, None])[mask]
+    counts = np.bincount(index, minlength=BANDS * CODES).astype(np.float32)
+    return smoothed(counts.reshape(BANDS, CODES))
+
+
+def _bands_of_rows(count: int, top: float, height: float) -> Codes:
+    """Band of each of ``count`` rows of a crop in which a body begins at row ``top``."""
+    rows = np.arange(count, dtype=np.float32) + 0.5 - top
+    bands = np.clip(rows * (BANDS / max(height, 1.0)), 0, BANDS - 1)
+    return np.asarray(bands, np.int32)
+
+
+def band_similarity(counts: Floats, model: Floats) -> float:
+    """Bhattacharyya coefficient of the bands, weighted by how many pixels ``counts`` has in each.
+
+    Args:
+        counts: ``(BANDS, CODES)`` of a candidate.
+        model: ``(BANDS, CODES)`` of the target, each row summing to 1 (or 0 where never seen).
+
+    Returns:
+        0 to 1; 0 where no band of the candidate has been seen on the target.
+    """
+    total = counts.sum(axis=1)
+    known = (total > 0) & (model.sum(axis=1) > 0)
+    if not known.any():
+        return 0.0
+    common = np.sqrt(counts[known] * model[known]).sum(axis=1) / np.sqrt(total[known])
+    return float((common * total[known]).sum() / total[known].sum())

@@ -35,8 +35,7 @@ class ColorPosterior:
     """
 
     def __init__(self) -> None:
-        self._target: Floats | None = None
-        self._around: Floats | None = None
+        self._target, self._around = np.zeros((2, CODES), np.float32)
         self._posterior = np.full(CODES, 0.5, np.float32)
 
     def learn(self, codes: Codes, target: Mask, around: Mask, rate: float) -> None:
@@ -45,11 +44,8 @@ class ColorPosterior:
         outside = np.bincount(codes[around], minlength=CODES).astype(np.float32)
         inside /= max(float(inside.sum()), 1.0)
         outside /= max(float(outside.sum()), 1.0)
-        if self._target is None or self._around is None:
-            self._target, self._around = inside, outside
-        else:
-            self._target += np.float32(rate) * (inside - self._target)
-            self._around += np.float32(rate) * (outside - self._around)
+        self._target += np.float32(rate) * (inside - self._target)
+        self._around += np.float32(rate) * (outside - self._around)
         prior = np.float32(PRIOR)
         self._posterior = (self._target + prior) / (self._target + self._around + 2 * prior)
 

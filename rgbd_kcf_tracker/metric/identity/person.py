@@ -122,13 +122,12 @@ class Person:
     @property
     def alive(self) -> bool:
         """Whether this is surely somebody and not a thing that was moved or a door that opened."""
-        return self.chosen or ((self.upright or self.travelled > TRAVELLED) and not self._is_piece)
-
-    @property
-    def _is_piece(self) -> bool:
-        """Whether it is a piece of a wall, or of something else that goes on beside it."""
+        if self.chosen:
+            return True
+        # What goes on beside it is something that it is a piece of, as of a wall.
         joined = self.joined.mean if self.joined.enough else None
-        return joined is not None and joined > JOINED
+        apart = joined is None or joined <= JOINED
+        return (self.upright or self.travelled > TRAVELLED) and apart
 
     def log_odds(self, view: View, time: float, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of this person by look and height.

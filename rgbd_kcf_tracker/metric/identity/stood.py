@@ -45,6 +45,9 @@ class Stood:
         place: ``(3,)`` metres in the camera's frame.
         sigma: ``(3,)`` metres, its deviation.
         width: of the target, metres.
+
+    Attributes:
+        place: where it stands, ``(3,)`` metres in the camera's frame of now.
     """
 
     def __init__(self, place: FloatArray, sigma: FloatArray, width: float) -> None:
@@ -54,7 +57,7 @@ class Stood:
 
     def point(self, place: FloatArray, sigma: FloatArray, width: float) -> None:
         """Say the place of the same target by another point of it, as its upper edge."""
-        self._place, self._vague = np.array(place, np.float64), float(sigma.max())
+        self.place, self._vague = np.array(place, np.float64), float(sigma.max())
         self._size = OFF + OFF_SHARE * width
 
     def carried(self, motion: Pose | Lost | None, dt: float) -> None:
@@ -63,19 +66,19 @@ class Stood:
         if isinstance(motion, Lost):
             self.moves()  # or seems to
         elif motion is not None:
-            self._place, self._carried = motion.of(self._place), True
+            self.place, self._carried = motion.of(self.place), True
             self._off += DRIFT * (motion.turn + motion.shift)
 
     def seen(self, place: FloatArray, sigma: FloatArray, dt: float) -> None:
         """Take where the target is, ``(3,)`` metres, each axis with its own deviation."""
-        off = place - self._place
+        off = place - self.place
         if np.any(np.abs(off) > 3 * np.hypot(sigma, self._size + self._off)):
             self.moves()
         near, _ = self._likely(place, sigma)
         if near < 1:  # as likely anywhere else: that says nothing of where it stood
             return
         share = 1 - math.exp(-dt / STEADY)
-        self._place += share * off
+        self.place += share * off
         self._vague += share * (float(sigma.max()) - self._vague)
         self._off *= 1 - share
         self._for += dt
@@ -93,11 +96,6 @@ class Stood:
         """
         return self._carried and self._known and self._vague < SURELY
 
-    @property
-    def place(self) -> FloatArray:
-        """Where it stands, ``(3,)`` metres in the camera's frame of now."""
-        return self._place
-
     def log_odds(self, place: FloatArray, sigma: FloatArray) -> float:
         """What a place says for its being the target, 0 where that is not known.
 
@@ -113,7 +111,7 @@ class Stood:
     def _likely(self, place: FloatArray, sigma: FloatArray) -> tuple[float, float]:
         """How likely a place is if the target stands, against any other, and that it moved."""
         variance = np.square(sigma) + (self._size + self._off) ** 2 + self._vague**2
-        near = math.exp(GAIN - 0.5 * float((np.square(place - self._place) / variance).sum()))
+        near = math.exp(GAIN - 0.5 * float((np.square(place - self.place) / variance).sum()))
         still = 1 - math.exp(-self._for / STANDS)
         carried_off = CARRIED_OFF + (SUDDENLY - CARRIED_OFF) * math.exp(-self._unseen / CARRYING)
         moved = CHOSEN_MOVING + (carried_off - CHOSEN_MOVING) * still
