@@ -711,9 +711,9 @@ def test_what_was_refused_is_not_where_the_target_is_sought_from_then_on(
     look.refuse(at(1, 155), found)
     asked, look_at = [], ByLook._look_at
 
-    def watched(self: ByLook, frame: Frame, small: np.ndarray, cx: float, cy: float):
+    def watched(self: ByLook, frame: Frame, cx: float, cy: float):
         asked.append((cx, cy))
-        return look_at(self, frame, small, cx, cy)
+        return look_at(self, frame, cx, cy)
 
     monkeypatch.setattr(ByLook, '_look_at', watched)
     look.step(at(2, 155), 0.1)

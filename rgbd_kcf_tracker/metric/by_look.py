@@ -181,24 +181,24 @@ class ByLook:
         self._unseen += dt
         if self._hidden and not turn:
             return None
-        small = self._small = _small(frame)
+        self._small = _small(frame)
         if self._backdrop is not None:
             self._backdrop.see(_averaged(frame), self.last_box.over(_step_of(frame)), dt)
         if self._hidden:
-            stands = None if expected is None else self._there(frame, small, expected)
-            sighting = stands or self._searched(frame, small, None)
+            stands = None if expected is None else self._there(frame, expected)
+            sighting = stands or self._searched(frame, None)
             self._hidden = stands is None and sighting.ratio < parameters.seen_ratio
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
             at = self._cx, self._cy
             there = at if expected is None else (expected.cx, expected.cy)
-            sighting = self._look_at(frame, small, *there)
+            sighting = self._look_at(frame, *there)
             if there != at and sighting.ratio < UNSURE:  # or it has begun to move
-                moved = self._look_at(frame, small, *at)
+                moved = self._look_at(frame, *at)
                 sighting = max(sighting, moved, key=lambda each: each.ratio)
             if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
-                other = self._searched(frame, small, sighting)
+                other = self._searched(frame, sighting)
                 if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio and not (
@@ -239,15 +239,12 @@ class ByLook:
             return
         self._unlearned += dt
         if self._turn:
-            self._learn(frame, self._unlearned)
+            at = frame.color, self._cx, self._cy
+            self._appearance.learn(*at, self._scale, self._unlearned)
+            self._scales.learn(*at, *self._size, share_after(SCALE_RATE, self._unlearned))
             self._unlearned = 0.0
         self._appearance.remember_peak(look.peak, dt)
         self._elsewhere.keep(self._small, look.box.over(_step_of(frame)))
-
-    def _learn(self, frame: Frame, seconds: float) -> None:
-        self._appearance.learn(frame.color, self._cx, self._cy, self._scale, seconds)
-        rate = share_after(SCALE_RATE, seconds)
-        self._scales.learn(frame.color, self._cx, self._cy, *self._size, rate)
 
     def glance(self, frame: Frame, box: Box, dt: float, goes_on: bool) -> Look | None:
         """Look only about where the target is expected.
@@ -332,9 +329,9 @@ class ByLook:
         self.last_box = self.last_box.stretched(across, down)
         zoom = float(np.sqrt(across * down))
         self._zoom *= zoom
-        self._scale = float(np.clip(self._scale * zoom, *SCALE_RANGE))
+        self._scale = _in_range(self._scale * zoom)
         scale, depth = self._sure
-        self._sure = float(np.clip(scale * zoom, *SCALE_RANGE)), depth
+        self._sure = _in_range(scale * zoom), depth
 
     def _depthless(self, frame: Frame) -> bool:
         """Whether depth tells nothing of the target's size."""
@@ -357,24 +354,23 @@ class ByLook:
         self._cy = float(np.clip(self._cy + flow.dy, 0, frame.height))
         # What the filter over scale resolves is left to it: the flow's small errors add up.
         if abs(flow.growth - 1) > SCALE_STEP - 1:
-            self._scale = float(np.clip(self._scale * flow.growth, *SCALE_RANGE))
+            self._scale = _in_range(self._scale * flow.growth)
 
     def _place(self, box: Box) -> None:
         self._flow.forget()
         self._hidden = False
         self._cx, self._cy = box.cx, box.cy
-        ratio = box.height / self._appearance.height
-        self._scale = float(np.clip(ratio, *SCALE_RANGE))
+        self._scale = _in_range(box.height / self._appearance.height)
 
     @property
     def _size(self) -> tuple[float, float]:
         return self._appearance.width * self._scale, self._appearance.height * self._scale
 
-    def _look_at(self, frame: Frame, small: Image, cx: float, cy: float) -> Sighting:
+    def _look_at(self, frame: Frame, cx: float, cy: float) -> Sighting:
         """Look about a place; what stood there while the target was elsewhere is not seen."""
         possible = self._possible(frame, cx, cy)
         sighting = self._appearance.look(frame.color, cx, cy, self._scale, possible)
-        if self._elsewhere.unchanged(small, self._box_at(sighting).over(_step_of(frame))):
+        if self._elsewhere.unchanged(self._small, self._box_at(sighting).over(_step_of(frame))):
             return dataclasses.replace(sighting, peak=0.0, ratio=0.0)
         return sighting
 
@@ -394,15 +390,19 @@ class ByLook:
         near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
         return grown(near)
 
+    @property
+    def _box(self) -> Box:
+        return Box.from_center(self._cx, self._cy, *self._size)
+
     def _box_at(self, sighting: Sighting) -> Box:
         return Box.from_center(sighting.cx, sighting.cy, *self._size)
 
-    def _there(self, frame: Frame, small: Image, expected: Box) -> Sighting | None:
+    def _there(self, frame: Frame, expected: Box) -> Sighting | None:
         """What is where a hidden target stands, if depth bears out that it is still there.
 
         It need not look as much like itself there as anywhere else.
         """
-        found = self._look_at(frame, small, expected.cx, expected.cy)
+        found = self._look_at(frame, expected.cx, expected.cy)
         enough = found.ratio >= self._parameters.hidden_ratio
         return found if enough and self.still_there(frame, self._box_at(found)) else None
 
@@ -413,32 +413,30 @@ class ByLook:
         """
         return self._relief.left_in(Relief.of(frame, box))
 
-    def _searched(self, frame: Frame, small: Image, best: Sighting | None) -> Sighting:
+    def _searched(self, frame: Frame, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.
 
         The cost is the same whatever the image shows: a fixed number of windows is looked into.
         """
         if best is None:
-            best = self._look_at(frame, small, self._cx, self._cy)
+            best = self._look_at(frame, self._cx, self._cy)
             if best.ratio > self._parameters.seen_ratio:
                 return best
         step = _step_of(frame)
-        posterior = self._appearance.posterior(small)
+        posterior = self._appearance.posterior(self._small)
         # Windows larger than the image show no more of it than all.
         width, height = (
             min(max(1, round(side / step)), most)
-            for side, most in zip(self._size, small.shape[1::-1], strict=True)
+            for side, most in zip(self._size, self._small.shape[1::-1], strict=True)
         )
-        inner = cv2.boxFilter(
-            posterior, -1, (width | 1, height | 1), borderType=cv2.BORDER_REPLICATE
-        )
-        outer = cv2.boxFilter(
-            posterior, -1, (2 * width | 1, 2 * height | 1), borderType=cv2.BORDER_REPLICATE
+        inner, outer = (
+            cv2.boxFilter(posterior, -1, (w | 1, h | 1), borderType=cv2.BORDER_REPLICATE)
+            for w, h in ((width, height), (2 * width, 2 * height))
         )
         contrast = inner - np.float32(0.7) * outer
         for _ in range(PEAKS):
             row, col = (int(i) for i in np.unravel_index(np.argmax(contrast), contrast.shape))
-            found = self._look_at(frame, small, (col + 0.5) * step, (row + 0.5) * step)
+            found = self._look_at(frame, (col + 0.5) * step, (row + 0.5) * step)
             if found.ratio > best.ratio:
                 best = found
             contrast[
@@ -449,18 +447,16 @@ class ByLook:
     def _found(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
         self._cx = float(np.clip(sighting.cx, 0, frame.width))
         self._cy = float(np.clip(sighting.cy, 0, frame.height))
-        depth = depth_in(frame, Box.from_center(self._cx, self._cy, *self._size))
+        depth = depth_in(frame, self._box)
         self._rescale(frame, depth, sighting, dt)
-        box = Box.from_center(self._cx, self._cy, *self._size)
-        return Look(box, sighting.ratio, sighting.peak, depth)
+        return Look(self._box, sighting.ratio, sighting.peak, depth)
 
     def _moving(self, frame: Frame) -> Look | None:
         """The target by what moves where it was: something hides a part of it, or it has turned."""
         if self._backdrop is None:
             return None
         step = _step_of(frame)
-        whole = Box.from_center(self._cx, self._cy, *self._size)
-        piece = self._backdrop.follow(whole.over(step), self._appearance.posterior)
+        piece = self._backdrop.follow(self._box.over(step), self._appearance.posterior)
         if piece is None or piece.share < LEAST_SHARE or piece.alike < ALIKE:
             return None
         box = piece.box.over(1 / step)
@@ -492,7 +488,7 @@ class ByLook:
         # Of what the image cuts off, nothing tells how high it is.
         if outline.told > WELL_TOLD and box.y > step and box.bottom < frame.height - step:
             share = 1 - float(np.exp(-dt / OUTLINE_TIME))
-            self._scale = float(np.clip(self._scale * apart**share, *SCALE_RANGE))
+            self._scale = _in_range(self._scale * apart**share)
             self._cy += share * (box.cy - filtered.cy)
         return dataclasses.replace(look, box=box)
 
@@ -505,7 +501,11 @@ class ByLook:
             self._scale *= float(np.exp(np.clip(wanted, -0.3, 0.3) * min(1, dt / SCALE_TIME)))
         else:
             self._scale *= self._scales.factor(frame.color, self._cx, self._cy, *self._size)
-        self._scale = float(np.clip(self._scale, *SCALE_RANGE))
+        self._scale = _in_range(self._scale)
+
+
+def _in_range(scale: float) -> float:
+    return float(np.clip(scale, *SCALE_RANGE))
 
 
 def _step_of(frame: Frame) -> int:
