@@ -46,14 +46,7 @@ class Dark:
         self._unseen = 0.0
 
     def seen(self, frame: Frame, box: Box, depth: float, score: float) -> None:
-        """Take a frame with depth in which the target was found.
-
-        Args:
-            frame: the frame.
-            box: the target.
-            depth: metres, of it.
-            score: how surely it is the target.
-        """
+        """Take a frame with depth in which the target was found, at ``depth`` metres."""
         self.forget()
         self._last = _Last(frame, box, depth, score)
 

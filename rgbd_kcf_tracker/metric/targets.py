@@ -360,9 +360,7 @@ class MetricTargets:
     def _shown_in(self, box: Box, follower: Follower) -> int | None:
         """The id of the target that a box of the last frame is about, None for nobody's.
 
-        Args:
-            box: the box.
-            follower: of what is in it.
+        ``follower`` is one of what is in it.
         """
         mine = follower.person
         for number, each in self._followers.items():

@@ -179,11 +179,7 @@ class Account:
         return self.sight_among(self.parts.counts(seen))
 
     def sight_among(self, counts: list[int]) -> int:
-        """Index of the sight that most of some pixels belong to, -1 for none.
-
-        Args:
-            counts: of the pixels, see :meth:`Parts.counted`.
-        """
+        """The same of some pixels, of which :meth:`Parts.counted` gave ``counts``."""
         most = max(counts[FIRST:], default=0)
         return counts.index(most, FIRST) - FIRST if most > MOST * sum(counts) else -1
 
@@ -216,12 +212,7 @@ class Account:
         return index >= 0 and SAME < self.sights[index].figure.seen.area / seen.area < 1 / SAME
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
-        """What all that is known of the frame says of a silhouette being ``person``.
-
-        Args:
-            person: somebody who was known before the frame.
-            seen: the silhouette.
-        """
+        """What all that is known of the frame says of a silhouette being somebody known before."""
         row = self.people.index(person)
         # A small thing is no figure, but may be in the hands or at the feet of one.
         small = person.area < SMALL
@@ -300,11 +291,8 @@ class Account:
     def others(self, person: Person, room: bool = True) -> Others:
         """The pixels that are surely not a person's.
 
-        They belong to somebody who was seen beside him, or are the room where he is no part of it.
-
-        Args:
-            person: he.
-            room: whether the room counts.
+        They belong to somebody who was seen beside him, or are the room, if that counts, where he
+        is no part of it.
         """
         met = [False] * len(self.sights)
         for other, index in self.in_view.items():
@@ -383,10 +371,5 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
 
 
 def absent(gone: float, misses: int) -> bool:
-    """Whether somebody was away, and not only missed once by a slow camera.
-
-    Args:
-        gone: seconds since he was last seen.
-        misses: frames that have shown nothing of him since.
-    """
+    """Whether who was seen ``gone`` seconds ago was away, and not only missed by a slow camera."""
     return gone > (REUNION if misses >= MISSES else PAUSE)

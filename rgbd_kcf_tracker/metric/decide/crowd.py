@@ -116,11 +116,7 @@ class Crowd:
     def chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         """Whoever a silhouette of the frame shows, as one who is to be followed from now on.
 
-        Args:
-            account: of the frame.
-            seen: the silhouette.
-            since: seconds from which he has been followed by other means: who was welcomed
-                meanwhile is he.
+        By other means he has been since ``since``, in seconds: who was welcomed meanwhile is he.
         """
         person = self._chosen(account, seen, since)
         self._introduce(account, {person.number: seen})
@@ -210,12 +206,9 @@ class Crowd:
     def explain(
         self, scene: Scene, time: float, opens: Callable[[Silhouette], None] | None = None
     ) -> Account:
-        """Explain the next frame; :meth:`learn` must follow.
+        """Explain the next frame, at ``time`` in seconds; :meth:`learn` must follow.
 
-        Args:
-            scene: of the frame.
-            time: seconds.
-            opens: takes what turns out to be somebody out of the room.
+        ``opens`` takes what turns out to be somebody out of the room.
         """
         self.time = time
         self._frames += 1

@@ -30,12 +30,7 @@ LIKE = 1.0
 
 
 def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
-    """What passes for the room where a target stood that is not in view, and looks as it does.
-
-    Args:
-        scene: of now.
-        people: all who are known, their places as the camera stands now.
-    """
+    """What passes for the room where a target stood that is not in view, and looks as it does."""
     away = [p for p in people if p.chosen and p.misses and p.gallery.views]
     if not away or scene.stood_for > SETTLE:
         return []

@@ -76,12 +76,7 @@ def visible_box(scene: Scene, body: Body, seen: Silhouette, top: float) -> Box:
 
     Feet, which go with the floor when that is taken out, are added down to the floor; and where the
     depth image ends before the colour image does, the columns that go on in the body's colours.
-
-    Args:
-        scene: of now.
-        body: the target.
-        seen: its silhouette.
-        top: metres, of the body's upper edge.
+    The body's upper edge is at ``top`` metres.
     """
     cols = seen.mask.shape[1]
     left, right = float(seen.left), float(seen.left + cols)

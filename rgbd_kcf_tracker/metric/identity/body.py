@@ -174,11 +174,8 @@ class Body:
     def odds_of(self, codes: Codes, seen: Silhouette, view: DepthView, top: float) -> Floats:
         """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
 
-        Args:
-            codes: ``(h, n)`` with the silhouette's rows.
-            seen: the silhouette.
-            view: the depth.
-            top: metres, of the body's upper edge.
+        ``codes`` are ``(h, n)`` with the silhouette's rows; the body's upper edge is at ``top``
+        metres.
         """
         row, rows = self._rows(seen, view, top)
         band = _bands_of_rows(len(codes), row, rows)
@@ -220,14 +217,9 @@ class Body:
     def learn_colors(
         self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float, dt: float | None
     ) -> None:
-        """Follow the colours of a silhouette.
+        """Follow the colours of a silhouette, ``dt`` seconds since the last time, None at first.
 
-        Args:
-            seen: the silhouette.
-            codes: of the view's colours.
-            view: the depth.
-            top: metres, of the body's upper edge.
-            dt: seconds since the last time, None at first.
+        The body's upper edge is at ``top`` metres.
         """
         counts = self._histograms(seen, codes, view, top)
         rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
@@ -246,14 +238,9 @@ class Body:
         part: tuple[slice, slice],
         dt: float | None,
     ) -> None:
-        """Follow the colours of what stands beside the body; a part without a reading is left out.
+        """Follow the colours of what stands beside a silhouette, in a part of the view about it.
 
-        Args:
-            seen: its silhouette, which is not beside it.
-            codes: of the view's colours.
-            view: the depth.
-            part: rows and columns of the view about the body.
-            dt: seconds since the last time, None at first.
+        What has no reading is left out. It is ``dt`` seconds since the last time, None at first.
         """
         beside = view.depth > 0
         beside[seen.rows, seen.cols] &= ~seen.mask

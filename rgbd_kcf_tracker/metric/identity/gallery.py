@@ -199,9 +199,7 @@ class Looks:
     def of(cls, views: Sequence[View], trust: Sequence[float] = ()) -> Looks:
         """Stack at least one view.
 
-        Args:
-            views: the views.
-            trust: log-odds that each is of whom it is taken for; none for all that surely are.
+        ``trust`` are log-odds that each is of whom it is taken for; none for all that surely are.
         """
         even = _even(len(views), views[0].grey)
         trusted = np.array(trust, np.float32) if trust else np.full(len(views), np.inf, np.float32)
@@ -459,9 +457,7 @@ class Gallery:
     def log_odds(self, view: View, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
 
-        Args:
-            view: the view.
-            alike: its likeness to the person, see :meth:`Compared.of_each`, where that is known.
+        ``alike`` is its likeness to the person, where that is known, see :meth:`Compared.of_each`.
         """
         if self.looks is not None and alike is None:
             alike = Compared.of(view, self.looks).of_each([0])[0].tolist()
@@ -470,10 +466,7 @@ class Gallery:
     def log_odds_before(self, time: float, view: View, alike: Floats) -> float | None:
         """The same by what was learned before ``time``, in seconds; None where nothing was.
 
-        Args:
-            time: seconds.
-            view: the view.
-            alike: its :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
+        ``alike`` is the view's :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
         """
         old = alike[np.array([each.time for each in self._learned]) < time]
         return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
@@ -500,10 +493,7 @@ class Gallery:
     def learn(self, view: View, time: float, trust: float = math.inf) -> None:
         """Take a view of this person, where it shows something new, more of it, or more surely.
 
-        Args:
-            view: the view.
-            time: seconds, when it was seen.
-            trust: log-odds that it is of this person.
+        It was seen at ``time`` in seconds, and is of this person by log-odds of ``trust``.
         """
         self._learn(_Learned(view, time, trust))
 
@@ -528,13 +518,9 @@ class Gallery:
                 self._learn(each)
 
     def doubt(self, since: float, odds: float) -> None:
-        """What was learned from ``since`` on, in seconds, is no likelier of this person.
+        """What was learned from ``since`` on, in seconds, is of this person by ``odds`` at most.
 
         Who is like a view is this person no surer than the view itself is of him.
-
-        Args:
-            since: seconds.
-            odds: log-odds.
         """
         if any(each.time >= since and each.trust > odds for each in self._learned):
             self._set_learned(

@@ -130,13 +130,7 @@ class Person:
         return (self.upright or self.travelled > TRAVELLED) and apart
 
     def log_odds(self, view: View, time: float, alike: Sequence[float] | None = None) -> float:
-        """Log-odds that a view is of this person by look and height.
-
-        Args:
-            view: the view.
-            time: seconds.
-            alike: see :meth:`Gallery.log_odds`.
-        """
+        """Log-odds that a view at ``time`` is of this person, see :meth:`Gallery.log_odds`."""
         return 0.0 if self.lies(view.top, time, view.leans) else self.gallery.log_odds(view, alike)
 
     def lies(self, top: float | None, time: float, leans: bool = False) -> bool:
@@ -192,11 +186,7 @@ class Person:
         self.last, self.hidden = None, True
 
     def missed(self, depth: Floats) -> None:
-        """Take a frame in which it was not found.
-
-        Args:
-            depth: ``(h, w)`` metres, 0 where there is no reading.
-        """
+        """Take a frame, of ``(h, w)`` metres of depth, in which it was not found."""
         self.misses += 1
         if self.last is None or not self.hidden:
             return
@@ -219,12 +209,7 @@ class Person:
     def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
         """Take log-odds of a sighting of this one to look like another, who is not in view.
 
-        Args:
-            other: the number of the other.
-            odds: log-odds.
-            time: seconds; what was seen before counts less.
-            weight: how much of this one showed, 0 to 1: a part that is seen past somebody else has
-                colours of his as well.
+        ``other`` is the number of that one; the rest is as for :meth:`Tally.add`.
         """
         self._resembles.setdefault(other, Tally()).add(odds, weight, time)
 

@@ -86,12 +86,7 @@ def depth_step(z: float) -> float:
 
 
 def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
-    """The figures of a scene.
-
-    Args:
-        scene: of now.
-        expected: ``(n, 2)`` metres across and deep, where people are expected.
-    """
+    """The figures of a scene; people are ``expected`` at ``(n, 2)`` metres across and deep."""
     mask = scene.before & scene.standing
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     if not width:

@@ -192,12 +192,7 @@ class Room:
     def passing(self, people: Mask, depth: Floats, surfaces: Surfaces) -> Mask:
         """Those of people's pixels, ``(h, w)`` bool, whose surface does not stand before the room.
 
-        They passed for the room as they were first seen.
-
-        Args:
-            people: pixels of surfaces.
-            depth: ``(h, w)`` metres of a view.
-            surfaces: of it.
+        They passed for the room as they were first seen. ``depth`` is ``(h, w)`` metres.
         """
         nearer = people & self._nearer(depth)
         theirs, before = (

@@ -340,10 +340,6 @@ class SceneReader:
         """Whether a silhouette of the last scene turns out to be part of the room it stands before.
 
         It is taken into it then.
-
-        Args:
-            seen: the silhouette.
-            scene: the scene.
         """
         mask = seen.in_view(scene.view.shape)
         return self.room.goes_on(mask, scene.view.depth, scene.surfaces, scene.large)

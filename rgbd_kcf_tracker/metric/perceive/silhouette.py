@@ -210,17 +210,9 @@ class Silhouette:
     def trimmed(
         cls, view: DepthView, left: int, top: int, mask: Mask, rim: Rim
     ) -> Silhouette | None:
-        """A part of one, or of several: its crop is made no larger than its pixels.
+        """A part of one, or of several: its crop is made no larger than its pixels, see :meth:`of`.
 
-        Args:
-            view: the depth.
-            left: column of the crop.
-            top: row of the crop.
-            mask: ``(h, w)`` bool.
-            rim: of the view.
-
-        Returns:
-            None where the mask has no pixel.
+        None where the mask has no pixel.
         """
         rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
         if not len(rows):

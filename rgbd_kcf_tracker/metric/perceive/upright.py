@@ -126,11 +126,8 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
     """Whether a silhouette has the breadth and length of a person, if not the shape.
 
     That is enough for what has come to stand before a room that is known: somebody too near to the
-    camera for his head to show, or for more than that, or who stoops.
-
-    Args:
-        seen: the silhouette.
-        top: metres of its upper end above the floor, None where no floor is known.
+    camera for his head to show, or for more than that, or who stoops. ``top`` is as of
+    :func:`upright`.
     """
     if not WIDTH[0] <= seen.width <= WIDTH[1]:
         return False
