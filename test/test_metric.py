@@ -234,6 +234,12 @@ def test_low_frame_rates(every: int):
     assert np.mean([follow(scene(name)[::every]).success for name in names]) > 0.85
 
 
+def test_who_walks_on_a_small_image_is_one_from_the_first_frame_on():
+    """Outlines of a pixel without a reading cut him in two, and he was lost in an empty room."""
+    run = follow(simulate('motion', seed=6001, rate_hz=10.0, size=(320, 240)))
+    assert run.success > 0.9
+
+
 @pytest.mark.slow
 def test_irregular_stamps_and_gaps():
     rng = np.random.default_rng(0)

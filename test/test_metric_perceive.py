@@ -94,6 +94,19 @@ def test_where_somebody_stood_from_the_first_frame_the_room_goes_on():
     assert not room.before.any()
 
 
+def test_who_moves_is_not_cut_along_where_his_outline_had_no_reading_at_first():
+    """What was read there for the first time, which was he, passed for the room."""
+    first, theirs = with_thing(), NOBODY.copy()
+    theirs[THING] = True
+    edge = cv2.dilate(theirs.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    first[edge & ~theirs] = 0.0
+    room = Room()
+    room.restart(first, theirs)
+    moved = np.roll(with_thing(), 6, axis=1)
+    see(room, moved, 0.1, None)
+    assert (room.before == (moved < WALL)).all(), 'all of him, and what he has left is room'
+
+
 @pytest.mark.parametrize(('gap', 'known'), [(0.5, True), (3.0, False)])
 def test_of_what_is_close_behind_somebody_it_stays_known_where_it_is(gap: float, known: bool):
     """Nothing else tells a cupboard from him who walks past it half a metre before it."""

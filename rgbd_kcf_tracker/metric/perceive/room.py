@@ -64,6 +64,10 @@ BEHIND = 0.4
 """Metres behind a person from which what shows in his place, and goes on as the room, is the room:
 he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
 
+_OUTLINE = np.ones((3, 3), np.uint8)
+"""Pixels about somebody in which there often is no reading, as two depths mix there. What is read
+there first, when he moves, would be the room, and a line along which he is cut in two."""
+
 
 def tolerance(depth: Floats) -> Floats:
     """Metres by which a reading may differ from another of the same place, ``(h, w)``."""
@@ -143,6 +147,14 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
     return result
 
 
+def _about(somebody: Mask, depth: Floats) -> Floats:
+    """Depth of somebody in his pixels and where beside them nothing is read, 0 elsewhere."""
+    front: Floats = np.where(somebody, depth, np.float32(0))
+    if front.size:
+        np.copyto(front, cv2.dilate(front, _OUTLINE), where=depth == 0)
+    return front
+
+
 class Room:
     """The room as one view sees it.
 
@@ -164,9 +176,10 @@ class Room:
         self.still = np.zeros(depth.shape, np.bool_)
         self.vacant = ~self.before
         self._farther = np.zeros_like(depth)
-        self._blind = np.where(somebody, np.uint8(BLIND_FRAMES), np.uint8(0))
+        front = _about(somebody, depth)
+        self._blind = np.where(front > 0, np.uint8(BLIND_FRAMES), np.uint8(0))
         self._still, self._still_for = np.zeros_like(depth), np.zeros_like(depth)
-        self._front = np.where(somebody, depth, np.float32(0))
+        self._front = front
         self._stood, self._stood_at = np.zeros_like(depth), np.zeros_like(depth)
         self._time = self._unlearned = 0.0
 
