@@ -64,7 +64,7 @@ BEHIND = 0.4
 """Metres behind a person from which what shows in his place, and goes on as the room, is the room:
 he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
 
-_OUTLINE = np.ones((3, 3), np.uint8)
+_SEAM = np.ones((5, 5), np.uint8)
 """Pixels about somebody in which there often is no reading, as two depths mix there. What is read
 there first, when he moves, would be the room, and a line along which he is cut in two."""
 
@@ -148,10 +148,12 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
 
 
 def _about(somebody: Mask, depth: Floats) -> Floats:
-    """Depth of somebody in his pixels and where beside them nothing is read, 0 elsewhere."""
+    """Depth of somebody in his pixels and in the seam without a reading about them, 0 elsewhere."""
     front: Floats = np.where(somebody, depth, np.float32(0))
     if front.size:
-        np.copyto(front, cv2.dilate(front, _OUTLINE), where=depth == 0)
+        read = (depth > 0).view(np.uint8)
+        seam = cv2.morphologyEx(read, cv2.MORPH_CLOSE, _SEAM) > read
+        np.copyto(front, cv2.dilate(front, _SEAM), where=seam)
     return front
 
 
