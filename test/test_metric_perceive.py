@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import EgoMotion, Lost, stands, upper_median
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.light import Light
-from rgbd_kcf_tracker.metric.perceive.room import REACH, SETTLE, Room
+from rgbd_kcf_tracker.metric.perceive.room import REACH, SETTLE, GoingOn, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
@@ -289,7 +289,7 @@ def test_the_room_is_seen_from_where_the_camera_has_moved_to():
     assert room.before.mean() < 0.01
 
 
-def goes_on(room: Room, depth: np.ndarray, large: bool = False) -> tuple[np.ndarray, ...]:
+def goes_on(room: Room, depth: np.ndarray, large: bool = False) -> GoingOn:
     surfaces = surfaces_in(depth, depth > 0, 0.04, 0.03)
     return room.going_on(depth, surfaces, np.full(len(surfaces), large), CAMERA, 0.1)
 
@@ -336,10 +336,10 @@ def test_what_goes_on_from_somebody_as_one_surface_is_somebody():
     see(room, half, 0.1, None)
     room.depth[:, 80:] = 0  # somebody nearer has hidden all that is there
     depth = with_thing()
-    going_on = goes_on(room, depth)[0]
+    going_on = goes_on(room, depth).somebody
     assert (going_on == (depth < WALL)).all(), 'and the wall behind goes on as the wall'
     room.depth[:, 65:] = 0
-    few = goes_on(room, depth)[0]
+    few = goes_on(room, depth).somebody
     assert not few.any(), 'a few pixels tell nothing of the rest'
 
 
@@ -351,13 +351,13 @@ def test_who_touches_a_desk_before_a_camera_that_moves_is_not_the_desk():
     desk[90:110, 50:156] = True
     depth = np.where(person | desk, np.float32(2.0), wall()).astype(np.float32)
     room.depth[:, 60:] = 0  # this has come into view
-    somebody, beyond = goes_on(room, depth)
-    assert (somebody == (person | desk)).all()
-    assert not beyond.any()
-    somebody, beyond = goes_on(room, depth, large=True)
-    assert not (somebody & beyond).any()
-    assert (somebody | beyond)[person | desk].all()
-    columns = np.flatnonzero(somebody.any(axis=0))
+    alone = goes_on(room, depth)
+    assert (alone.somebody == (person | desk)).all()
+    assert not alone.beyond.any()
+    touched = goes_on(room, depth, large=True)
+    assert not (touched.somebody & touched.beyond).any()
+    assert (touched.somebody | touched.beyond)[person | desk].all()
+    columns = np.flatnonzero(touched.somebody.any(axis=0))
     assert columns[0] == 10
     reached = (columns[-1] - 30) * 2.0 / CAMERA.fx
     assert REACH - 0.1 < reached < REACH + 0.1
@@ -369,7 +369,7 @@ def test_who_walks_into_the_view_of_a_camera_that_turns_is_somebody():
     depth = wall()
     depth[20:150, 100:] = 2.0
     room.depth[:, 110:] = 0
-    assert (goes_on(room, depth)[0] == (depth < WALL)).all()
+    assert (goes_on(room, depth).somebody == (depth < WALL)).all()
 
 
 def test_what_shows_far_behind_somebody_who_has_gone_is_not_he():
@@ -379,8 +379,8 @@ def test_what_shows_far_behind_somebody_who_has_gone_is_not_he():
     room = Room()
     room.restart(with_thing(1.5), somebody)
     stepped, cupboard = with_thing(1.6), with_thing(4.0)
-    assert (goes_on(room, stepped)[0] == somebody).all()
-    assert not goes_on(room, cupboard)[0].any()
+    assert (goes_on(room, stepped).somebody == somebody).all()
+    assert not goes_on(room, cupboard).somebody.any()
 
 
 @pytest.mark.parametrize('large', [True, False])

@@ -119,7 +119,13 @@ def unlike(
 ) -> bool:
     """Whether what a box shows does not look as who is known.
 
-    Where :func:`view_in` gives nothing, nothing speaks against him.
+    Args:
+        gallery: his looks.
+        scene: of the frame.
+        box: in pixels of the image.
+        look: that follows him.
+        depth: metres; None where that is not known, see :func:`view_in`: where that gives nothing,
+            nothing speaks against him.
     """
     seen = view_in(scene, box, look, depth)
     return seen is not None and gallery.log_odds(seen) < UNLIKE

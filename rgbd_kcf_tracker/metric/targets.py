@@ -316,11 +316,6 @@ class MetricTargets:
             self._last_account = self.account
         return dt
 
-    @property
-    def _known(self) -> dict[int, Follower]:
-        """Those who are known as people, by the numbers of these."""
-        return {f.person.number: f for f in self._followers.values() if f.person is not None}
-
     def _turns(self, dt: float) -> list[int]:
         """Which targets followed by their look have their turn: who has waited longest."""
         depth = self.account is not None
@@ -336,16 +331,22 @@ class MetricTargets:
         if self.account is None or not self._unlearned:
             return
         self._unlearned = False
-        known = self._known
-        targets = {number: follower.seen for number, follower in known.items()}
-        unsure = {number for number, each in known.items() if each.track.score < LEARNED}
+        targets = {
+            f.person.number: f.seen for f in self._followers.values() if f.person is not None
+        }
+        unsure = {
+            f.person.number
+            for f in self._followers.values()
+            if f.person is not None and f.track.score < LEARNED
+        }
         self._crowd.learn(self.account, targets, unsure)
         self._reader.somebody = self.account.somebody()
         for person, calm, silhouette in self.account.calm:
             self._reader.is_furniture(silhouette)
             self._crowd.is_furniture(person, calm)
-            if person.number in known:
-                known[person.number].lose(self._time - calm.since)
+            for follower in self._followers.values():
+                if follower.person is person:
+                    follower.lose(self._time - calm.since)
         self._reader.lately = self.account.lately()
         # What a camera that moves sees for the first time, behind something, passes for the room.
         if self._reader.stood_for < SETTLE:
@@ -360,7 +361,7 @@ class MetricTargets:
     def _shown_in(self, box: Box, follower: Follower) -> int | None:
         """The id of the target that a box of the last frame is about, None for nobody's.
 
-        ``follower`` is one of what is in it.
+        ``follower`` is one that would follow what is in it.
         """
         mine = follower.person
         for number, each in self._followers.items():
@@ -393,7 +394,7 @@ class MetricTargets:
 
     def _others(self, frame: Frame) -> dict[int, Track]:
         """Tracks of those whom nobody chose, as far as they are in view or were a moment ago."""
-        chosen = set(self._known)
+        chosen = {f.person.number for f in self._followers.values() if f.person is not None}
         numbers = {person.number for person in self._crowd.people}
         self._names = {n: name for n, name in self._names.items() if n in numbers}
         tracks = {} if self.account is None else self._in_view(frame, self.account, chosen)

@@ -371,5 +371,8 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
 
 
 def absent(gone: float, misses: int) -> bool:
-    """Whether who was seen ``gone`` seconds ago was away, and not only missed by a slow camera."""
+    """Whether who was seen ``gone`` seconds ago was away, and not only missed by a slow camera.
+
+    ``misses`` frames have shown nothing of him since.
+    """
     return gone > (REUNION if misses >= MISSES else PAUSE)

@@ -116,7 +116,8 @@ class Crowd:
     def chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         """Whoever a silhouette of the frame shows, as one who is to be followed from now on.
 
-        By other means he has been since ``since``, in seconds: who was welcomed meanwhile is he.
+        He has been followed by other means since ``since``, in seconds: who was welcomed meanwhile
+        is he.
         """
         person = self._chosen(account, seen, since)
         self._introduce(account, {person.number: seen})

@@ -30,7 +30,10 @@ LIKE = 1.0
 
 
 def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
-    """What passes for the room where a target stood that is not in view, and looks as it does."""
+    """What passes for the room where a target stood that is not in view, and looks as it does.
+
+    The places of ``people`` are as the camera stands now.
+    """
     away = [p for p in people if p.chosen and p.misses and p.gallery.views]
     if not away or scene.stood_for > SETTLE:
         return []

@@ -186,7 +186,7 @@ class Person:
         self.last, self.hidden = None, True
 
     def missed(self, depth: Floats) -> None:
-        """Take a frame, of ``(h, w)`` metres of depth, in which it was not found."""
+        """Take a frame in which it was not found, ``(h, w)`` metres, 0 where nothing is read."""
         self.misses += 1
         if self.last is None or not self.hidden:
             return

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 from rgbd_kcf_tracker.geometry import Box, mask_box
-from rgbd_kcf_tracker.metric.perceive.depth_view import grown, in_box, part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import closed, grown, in_box, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import (
     CREPT,
     LEAST_CORNERS,
@@ -215,7 +215,7 @@ class Backdrop:
         if not differs.any():
             return None
         # What goes on behind what the target has covered is a piece of it.
-        pieces = _pieces(_closed(body | ~known))
+        pieces = _pieces(closed(body | ~known))
         inside = pieces.overlap(about)
         if not inside.any():
             return None
@@ -223,7 +223,7 @@ class Backdrop:
         mine[int(np.argmax(inside))] = True
         body &= pieces.mask(mine)
         # A sliver beyond what is not known is what something that passed has left there.
-        parts = _pieces(_closed(body))
+        parts = _pieces(closed(body))
         body &= parts.mask(parts.areas > SLIVER * np.count_nonzero(body))
         bounds = mask_box(body)
         if bounds is None:
@@ -382,13 +382,6 @@ def _pieces(mask: Mask) -> _Pieces:
     areas = np.where(areas >= SPECK, areas, 0)
     areas[0] = 0
     return _Pieces(labels, areas, edge)
-
-
-def _closed(mask: Mask) -> Mask:
-    """A mask without gaps of a pixel or two."""
-    square = np.ones((3, 3), np.uint8)
-    closed: Mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, square).view(np.bool_)
-    return closed
 
 
 def _mean(posterior: Posterior, image: Image, mask: Mask) -> float:

@@ -45,6 +45,13 @@ def grown(mask: Mask, side: int = 3) -> Mask:
     return wider
 
 
+def closed(mask: Mask, side: int = 3) -> Mask:
+    """A mask without gaps narrower than ``side`` pixels, ``(h, w)`` bool."""
+    square = np.ones((side, side), np.uint8)
+    filled: Mask = cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_CLOSE, square).view(np.bool_)
+    return filled
+
+
 def median_depth(frame: Frame, box: Box) -> float:
     """Median depth in a box of a frame in metres, nan where most of it has no reading."""
     if frame.depth is None:

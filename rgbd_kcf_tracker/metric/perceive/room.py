@@ -10,12 +10,15 @@ still and belongs to nobody becomes part of the room.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.metric.perceive.depth_view import closed
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
 
@@ -63,10 +66,9 @@ when it shows again only that tells it from him."""
 BEHIND = 0.4
 """Metres behind a person from which what shows in his place, and goes on as the room, is the room:
 he himself may have stepped back by less (at 5 Hz by 0.3), and touch a far wall."""
-
-_SEAM = np.ones((5, 5), np.uint8)
-"""Pixels about somebody in which there often is no reading, as two depths mix there. What is read
-there first, when he moves, would be the room, and a line along which he is cut in two."""
+SEAM = 5
+"""Pixels, two to each side, as far as which there often is no reading about somebody, as two depths
+mix there. What is read there first, when he moves, would be the room, and cut him in two."""
 
 
 def tolerance(depth: Floats) -> Floats:
@@ -151,10 +153,24 @@ def _about(somebody: Mask, depth: Floats) -> Floats:
     """Depth of somebody in his pixels and in the seam without a reading about them, 0 elsewhere."""
     front: Floats = np.where(somebody, depth, np.float32(0))
     if front.size:
-        read = (depth > 0).view(np.uint8)
-        seam = cv2.morphologyEx(read, cv2.MORPH_CLOSE, _SEAM) > read
-        np.copyto(front, cv2.dilate(front, _SEAM), where=seam)
+        read = depth > 0
+        beside = cv2.dilate(front, np.ones((SEAM, SEAM), np.uint8))
+        np.copyto(front, beside, where=closed(read, SEAM) & ~read)
     return front
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GoingOn:
+    """What goes on from somebody as one surface: pixels of a view.
+
+    Attributes:
+        somebody: ``(h, w)`` bool, what may be he.
+        beyond: ``(h, w)`` bool, what is farther from his middle than anybody reaches: something, or
+            somebody else, that he touches.
+    """
+
+    somebody: Mask
+    beyond: Mask
 
 
 class Room:
@@ -169,7 +185,6 @@ class Room:
 
     def __init__(self) -> None:
         self.restart(np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_))
-        self._unlearned = 0.0
 
     def restart(self, depth: Floats, somebody: Mask) -> None:
         """Take a first view, ``(h, w)`` metres, all of which is room but ``somebody``."""
@@ -284,7 +299,7 @@ class Room:
 
     def going_on(
         self, depth: Floats, surfaces: Surfaces, large: Mask, k: Intrinsics, dt: float
-    ) -> tuple[Mask, Mask]:
+    ) -> GoingOn:
         """What may be somebody as it goes on as one surface from what stands before the room.
 
         Args:
@@ -293,10 +308,6 @@ class Room:
             large: ``(n,)`` bool, those of them that nobody can be.
             k: of the view.
             dt: seconds since the last.
-
-        Returns:
-            ``(h, w)`` bool each: the pixels that may be somebody; and those farther from his middle
-            than anybody reaches, of something, or somebody else, that he touches.
         """
         valid, known, count = depth > 0, self.depth > 0, len(surfaces)
         # Where somebody stood, what is far behind him is not he.
@@ -318,7 +329,7 @@ class Room:
         far = large[label] & (np.abs(columns - middle[label]) * depth[rows, columns] > REACH * k.fx)
         beyond = np.zeros_like(somebody)
         beyond[rows[far], columns[far]] = True
-        return somebody & ~beyond, beyond
+        return GoingOn(somebody & ~beyond, beyond)
 
     def update(
         self,

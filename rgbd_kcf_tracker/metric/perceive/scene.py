@@ -309,15 +309,13 @@ class SceneReader:
             unknown = self.room.moved(motion, view.intrinsics)
             people = upright(True)
             large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
-            goes_on, beyond = self.room.going_on(
-                view.depth, surfaces, large, view.intrinsics, seconds
-            )
-            opened = (people.mask | goes_on) & unknown
+            going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
+            opened = (people.mask | going_on.somebody) & unknown
             opened |= self.room.passing(people.tall, view.depth, surfaces)
             self.room.open(opened, view.depth)
             # Whose other side comes into view next may be somebody or something, and so may
             # be what somebody touches.
-            undecided = _at_side(view, surfaces, rim, large) | beyond
+            undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
             self._light.restart()
             somebody = None
         self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided, closer)

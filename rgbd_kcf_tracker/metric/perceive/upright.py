@@ -193,11 +193,12 @@ def upright_people(
             found = [single] if upright(single, k, single.highest(elevation)) else []
         if not found and several[label]:
             parts = parted(view, forward, right, left, upper, mask)
+            parts = parts if len(parts) > 1 else []
             cut = [Silhouette.trimmed(view, left, upper, part, rim) for part in parts]
             found = [
                 part
                 for part in cut
-                if part is not None and len(cut) > 1
+                if part is not None
                 if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
         for seen in found:
