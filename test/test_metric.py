@@ -497,6 +497,11 @@ def test_who_comes_so_near_that_his_head_leaves_the_picture_is_followed():
     assert follow(simulate('approach', seed=191, rate_hz=10.0)).success > 0.95
 
 
+def test_who_is_chosen_beside_a_cupboard_that_he_touches_is_not_a_strip_of_it():
+    """What of it was within what a box may be off by was chosen with him, and stayed the target."""
+    assert follow(simulate('approach', seed=2, rate_hz=10.0, size=(320, 240))).success > 0.95
+
+
 def test_a_face_does_not_become_the_body_below_it():
     """What was cut out of the body by the box of the look had the same outline as that."""
     run = follow(simulate('face', seed=84, rate_hz=5.0, duration_s=3.0, size=SIZE))

@@ -396,10 +396,15 @@ def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
 
 
 def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
-    """The part of a silhouette in the box that was drawn: what sticks out is something else."""
-    grown = box.scaled(1 + 2 * OUTSIDE).over(scene.view.step)
-    rows, cols = part_in(scene.view.shape, grown)
-    part = seen.in_view(scene.view.shape)[rows, cols]
-    if np.count_nonzero(part) == np.count_nonzero(seen.mask):
+    """The part of a silhouette in the box that was drawn: what sticks out is something else.
+
+    Of what is larger than anybody, and goes on beyond what a box may be off by, so is the margin.
+    """
+    view = scene.view
+    mask = seen.in_view(view.shape)
+    rows, cols = part_in(view.shape, box.scaled(1 + 2 * OUTSIDE).over(view.step))
+    if np.count_nonzero(mask[rows, cols]) == np.count_nonzero(seen.mask):
         return seen
-    return Silhouette.trimmed(scene.view, cols.start, rows.start, part, scene.rim) or seen
+    if seen.label > 0 and scene.large[seen.label]:
+        rows, cols = part_in(view.shape, box.over(view.step))
+    return Silhouette.trimmed(view, cols.start, rows.start, mask[rows, cols], scene.rim) or seen
