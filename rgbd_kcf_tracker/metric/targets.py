@@ -340,7 +340,10 @@ class MetricTargets:
             if f.person is not None and f.track.score < LEARNED
         }
         self._crowd.learn(self.account, targets, unsure)
-        self._reader.somebody = self.account.somebody()
+        surely = [
+            each for number, each in targets.items() if each is not None and number not in unsure
+        ]
+        self._reader.somebody = self.account.somebody(surely)
         for person, calm, silhouette in self.account.calm:
             self._reader.is_furniture(silhouette)
             self._crowd.is_furniture(person, calm)

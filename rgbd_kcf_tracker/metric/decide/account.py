@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -345,10 +345,13 @@ class Account:
             if self.time - person.seen_at <= (COAST if person.hidden else FALLS)
         ]
 
-    def somebody(self) -> Mask:
-        """The pixels of those who are surely people, ``(h, w)`` bool: they may stand still."""
-        seen = (self.sights[n].figure.seen for p, n in self.in_view.items() if p.alive)
-        return together(seen, self.scene.view.shape)
+    def somebody(self, targets: Iterable[Silhouette] = ()) -> Mask:
+        """The pixels of ``targets`` and of those who are surely people, ``(h, w)`` bool.
+
+        They may stand still for as long as they like.
+        """
+        people = (self.sights[n].figure.seen for p, n in self.in_view.items() if p.alive)
+        return together([*people, *targets], self.scene.view.shape)
 
 
 def look_of(scene: Scene, seen: Silhouette) -> View:

@@ -228,7 +228,7 @@ class Crowd:
         for person in self.people:
             person.gallery.mixed &= time - person.first_seen < PARTING
         if opens is not None:
-            for seen in stayed(scene, self.people):
+            for seen in stayed(scene, self.people, time):
                 opens(seen)
         expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
         figures = find_figures(scene, np.array(expected).reshape(-1, 2))

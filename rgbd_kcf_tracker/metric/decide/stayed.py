@@ -1,12 +1,13 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Who still stands where he stood when a camera that turned away turns back.
+"""Who passes for the room though a target may be there, as that was not seen before.
 
 What a camera that moves sees for the first time passes for the room, unless it has all of a
-person's shape: not so who sits, or shows above a desk. But it is remembered where a target stood.
-Of others it is not asked: among all who were ever taken for somebody are pieces of furniture, which
-would come back as well (docs/experiments.md).
+person's shape: not so who sits, or shows above a desk, when it turns back to him. So does what
+shows when something is rolled away before a camera that stands. But it is remembered where a target
+was, and how it looks. Of others it is not asked: among all who were ever taken for somebody are
+pieces of furniture, which would come back as well (docs/experiments.md).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rgbd_kcf_tracker.metric.decide.account import MOST, look_of
+from rgbd_kcf_tracker.metric.decide.account import MOST, RECENT, look_of
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_AREA
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
@@ -29,13 +30,20 @@ LIKE = 1.0
 """Log-odds of his look, nearly three to one, from which it is he and not what he stood before."""
 
 
-def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
-    """What passes for the room where a target stood that is not in view, and looks as it does.
+def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouette]:
+    """What passes for the room where a target is that is not in view, and looks as it does.
 
-    The places of ``people`` are as the camera stands now.
+    Before a camera that moved it is where he was seen last; before one that stands, what something
+    shows that has left since. The places of ``people`` are as the camera stands now, at ``time`` in
+    seconds.
     """
     away = [p for p in people if p.chosen and p.misses and p.gallery.views]
-    if not away or scene.stood_for > SETTLE:
+    if not away:
+        return []
+    moved = scene.stood_for <= SETTLE
+    # A part of him may have shown for a moment, beside what left.
+    gone = {p: time - p.seen_at + RECENT for p in away}
+    if not moved and scene.known_for.min() > max(gone.values()):
         return []
     sizes, surfaces = scene.sizes, scene.surfaces
     places = (scene.axes @ np.stack((sizes.x, sizes.y, surfaces.depth))).T
@@ -43,10 +51,14 @@ def stayed(scene: Scene, people: Sequence[Person]) -> list[Silhouette]:
     possible[0] = False
     found = []
     for label in np.flatnonzero(possible).tolist():
-        near = [p for p in away if np.hypot(*(p.place - places[label])) < THERE]
+        seen, place = scene.silhouette(label), places[label]
+        if moved:
+            near = [p for p in away if np.hypot(*(p.place - place)) < THERE]
+        else:
+            since = np.median(seen.pixels(scene.known_for))
+            near = [p for p in away if since < gone[p] and not p.out_of_reach(place, time)]
         if not near:
             continue
-        seen = scene.silhouette(label)
         before = seen.pixels(scene.before)
         if np.count_nonzero(before) >= MOST * len(before):
             continue  # seen as a figure anyway

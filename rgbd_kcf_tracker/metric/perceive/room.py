@@ -181,6 +181,8 @@ class Room:
         before: ``(h, w)`` bool, the pixels of the last frame that show something before the room.
         still: ``(h, w)`` bool, those that show the room where it was in the frames before.
         vacant: ``(h, w)`` bool, where these have shown what is there when nobody is, be it nothing.
+        known_for: ``(h, w)`` float32 seconds since something left that had been before it; infinite
+            where nothing has, where the camera moved since, and where nobody was found in it.
     """
 
     def __init__(self) -> None:
@@ -192,6 +194,7 @@ class Room:
         self.before = somebody & (depth > 0)
         self.still = np.zeros(depth.shape, np.bool_)
         self.vacant = ~self.before
+        self.known_for = np.full_like(depth, np.inf)
         self._farther = np.zeros_like(depth)
         front = _about(somebody, depth)
         self._blind = np.where(front > 0, np.uint8(BLIND_FRAMES), np.uint8(0))
@@ -216,6 +219,7 @@ class Room:
     def close(self, part: Mask, depth: Floats) -> None:
         """Take pixels, ``(h, w)`` bool, into the room: they turned out to be part of it."""
         self.depth[part] = depth[part]
+        self.known_for[part] = np.inf
         self._blind[part] = 0
         self.before &= ~part
 
@@ -273,6 +277,7 @@ class Room:
         self._farther = _seen_from(self._farther, motion, k)
         self._still_for = np.zeros_like(self.depth)
         self._stood = np.zeros_like(self.depth)
+        self.known_for = np.full_like(self.depth, np.inf)
         self.vacant = ~unknown
         lost: Mask = unknown & ~opened
         return lost
@@ -356,6 +361,7 @@ class Room:
                 are; None for none.
         """
         self._time += dt
+        self.known_for += np.float32(dt)
         valid = depth > 0
         known = self.depth > 0
         allowed = tolerance(depth)
@@ -397,6 +403,7 @@ class Room:
         self.depth -= nearer
         again = farther & (np.abs(depth - self._farther) <= allowed)
         np.copyto(self.depth, depth, where=again)
+        np.copyto(self.known_for, np.float32(0), where=again)
         self._farther = depth * farther
         self._settle(depth, self._unlearned, allowed, somebody)
         self._unlearned = 0.0
@@ -458,4 +465,5 @@ class Room:
         settled = self._still_for > SETTLE
         if settled.any():
             self.depth[settled] = depth[settled]
+            self.known_for[settled] = np.inf
             self.before &= ~settled

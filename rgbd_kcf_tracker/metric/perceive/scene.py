@@ -57,6 +57,7 @@ class Scene:
         before: ``(h, w)`` bool, pixels that show something before the room.
         still: ``(h, w)`` bool, pixels that show the room where it was in the frames before.
         vacant: ``(h, w)`` bool, where the frames before have shown what is there when nobody is.
+        known_for: ``(h, w)`` float32, see :attr:`Room.known_for`.
         surfaces: what stands on it.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
@@ -81,6 +82,7 @@ class Scene:
     before: Mask
     still: Mask
     vacant: Mask
+    known_for: Floats
     surfaces: Surfaces
     rim: Rim
     image: Image
@@ -225,6 +227,7 @@ class SceneReader:
             before=before,
             still=self.room.still,
             vacant=self.room.vacant,
+            known_for=self.room.known_for,
             surfaces=surfaces,
             rim=rim,
             image=image,
