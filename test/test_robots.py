@@ -7,37 +7,53 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import create_tracker
+from rgbd_kcf_tracker import TargetSet
+from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
+from rgbd_kcf_tracker.metric.identity.body import Placed
+from rgbd_kcf_tracker.pose import Pose
+from rgbd_kcf_tracker.simulation.actors import FacesActor
 from rgbd_kcf_tracker.simulation.build import kinect2_intrinsics
+from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
-from rgbd_kcf_tracker.simulation.stage import Stage
+from rgbd_kcf_tracker.simulation.stage import Stage, route
 from rgbd_kcf_tracker.simulation.world import Actor
 
 SIZE, RATE_HZ = (320, 240), 10.0
 
 
-def shown(cast: Callable[[Stage, float], list[Actor]], seed: int, seconds: float) -> list[bool]:
-    """Of the frames that show most of the first of a cast, who is followed, which have his box."""
+Cast = Callable[[Stage, float], list[Actor]]
+
+
+def staged(cast: Cast, seed: int, seconds: float) -> SimulatedSequence:
+    """A cast in a room, the first of them chosen to be followed."""
     camera = kinect2_intrinsics(SIZE)
     stage = Stage(np.random.default_rng(seed), camera, SIZE)
     stage.place_camera(0.9, 1.4)
     scene = stage.scene(cast(stage, stage.uniform(2.5, 3.2)), seconds, room=stage.room((0, 1)))
-    scene.people = (0,)
+    scene.people = tuple(range(len(scene.actors)))
     offsets = [round(k * 1e9 / RATE_HZ) for k in range(round(seconds * RATE_HZ))]
-    sequence = SimulatedSequence(scene, cast.__name__, seed, RATE_HZ, offsets, SIZE, camera)
-    tracker, has = create_tracker('metric'), []
-    for i, sample in enumerate(sequence):
-        truth = sample.truths[1]
-        if i == 0:
-            assert truth.visible is not None
-            tracker.start(sample.frame, truth.visible)
+    return SimulatedSequence(scene, cast.__name__, seed, RATE_HZ, offsets, SIZE, camera)
+
+
+def followed(sequence: SimulatedSequence, count: int = 1) -> list[list[bool]]:
+    """Of the frames that show most of each of the first of a cast, which have his box."""
+    targets, numbers = TargetSet('metric'), list[int]()
+    has: list[list[bool]] = [[] for _ in range(count)]
+    for sample in sequence:
+        truths = [sample.truths[i + 1] for i in range(count)]
+        if not numbers:
+            assert all(truth.visible is not None for truth in truths)
+            numbers = [targets.add(sample.frame, truth.visible) for truth in truths]
             continue
-        box = tracker.update(sample.frame).box
-        if truth.visible is not None and truth.visible_fraction > 0.8:
-            has.append(box is not None and box.iou(truth.visible) > 0.5)
+        tracks = targets.update(sample.frame)
+        for each, number, truth in zip(has, numbers, truths, strict=True):
+            box = tracks[number].box
+            if truth.visible is not None and truth.visible_fraction > 0.8:
+                each.append(box is not None and box.iou(truth.visible) > 0.5)
     return has
 
 
@@ -64,20 +80,76 @@ def _board(stage: Stage, z: float, high: float) -> Actor:
     return stage.pushed_box(way, (0.9, high, 0.06), 'wood')
 
 
+def two_of_a_kind(stage: Stage, z: float) -> list[Actor]:
+    """The farther first."""
+    size = stage.uniform(0.4, 0.5), stage.uniform(0.45, 0.55), 0.36
+    faces = tuple(stage.box_faces((0, 0), size, 'wood'))
+    near, far = stage.x(0.6, z), stage.x(0.6, z + 0.6)
+    ways = [
+        route([(far, z + 0.6), (far, z + 0.6), (-far, z + 0.6), (far, z + 0.6)], 0.7),
+        route([(-near, z), (-near, z), (near, z), (-near, z)], 0.7),
+    ]
+    return [FacesActor(faces, Motion(way), size[1]) for way in ways]
+
+
 @pytest.mark.parametrize('seed', [1, 2])
 def test_a_robot_that_stops_is_no_part_of_the_room(seed: int):
     """After three seconds it was, and lost in full view until it drove on."""
-    has = shown(robot_that_stops, seed, 11.0)
+    (has,) = followed(staged(robot_that_stops, seed, 11.0))
     assert len(has) > 90
     assert sum(has) > 0.95 * len(has)
 
 
 @pytest.mark.parametrize('seed', [1, 2])
 @pytest.mark.parametrize('cast', [person_behind_a_board, robot_behind_a_board])
-def test_who_stands_behind_what_is_rolled_away_is_no_part_of_the_room(
-    cast: Callable[[Stage, float], list[Actor]], seed: int
-):
+def test_who_stands_behind_what_is_rolled_away_is_no_part_of_the_room(cast: Cast, seed: int):
     """What showed behind it passed for the room: he was lost in full view until he walked on."""
-    has = shown(cast, seed, 8.0)
+    (has,) = followed(staged(cast, seed, 8.0))
     assert len(has) > 40
     assert sum(has) > 0.9 * len(has)
+
+
+@pytest.mark.parametrize('count', [1, 2])
+@pytest.mark.parametrize('seed', [1, 2])
+def test_of_two_robots_that_cross_each_stays_the_one_it_was(seed: int, count: int):
+    """The farther went over to the nearer: nobody lower than a person was anybody else."""
+    for has in followed(staged(two_of_a_kind, seed, 7.0), count):
+        assert len(has) > 40
+        assert sum(has) > 0.9 * len(has)
+
+
+def at(x: float, z: float) -> Placed:
+    return Placed(np.array([x, 0.2, z]), np.full(3, 0.05), 1.0)
+
+
+def test_a_neighbour_is_found_where_it_goes_on_to_and_stays_in_the_world():
+    neighbours, target = Neighbours(1.0, 2.0), np.array([0.0, 0.2, 3.6])
+    neighbours.meet([at(0.8, 3.0)])
+    for i in range(1, 8):
+        neighbours.predict(0.1, None)
+        assert neighbours.find([at(0.8 - 0.1 * i, 3.0), at(0.0, 3.6)], target, 0.1) == [0]
+    # The camera turns by 90 degrees: what was ahead is on its left.
+    rotation, _ = cv2.Rodrigues(np.array([0.0, -np.pi / 2, 0.0]))
+    turned = Pose(rotation, np.zeros(3))
+    neighbours.predict(0.1, turned)
+    place, now = turned.of(np.array([[0.0, 0.2, 3.0], target]))
+    assert neighbours.find([Placed(place, np.full(3, 0.05), 1.0)], now, 0.1) == [0]
+
+
+@pytest.mark.parametrize(('x', 'found'), [(0.8, [0]), (0.2, []), (2.0, [])])
+def test_what_is_nearer_to_the_target_or_out_of_reach_is_no_neighbour(x: float, found: list[int]):
+    neighbours = Neighbours(1.0, 2.0)
+    neighbours.meet([at(0.8, 3.0)])
+    neighbours.predict(0.4, None)
+    assert neighbours.find([at(x, 3.0)], np.array([0.0, 0.2, 3.0]), 0.4) == found
+
+
+def test_a_neighbour_that_is_not_seen_for_a_second_is_forgotten():
+    neighbours, target = Neighbours(1.0, 2.0), np.array([0.0, 0.2, 3.0])
+    neighbours.meet([at(0.8, 3.0)])
+    for times in (0, 4, 5):
+        for _ in range(times):
+            neighbours.predict(0.2, None)
+            assert neighbours.find([], target, 0.2) == []
+        neighbours.predict(0.2, None)
+        assert neighbours.find([at(0.8, 3.0)], target, 0.2) == ([] if times == 5 else [0])

@@ -15,7 +15,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.account import MISSES, Account, absent
+from rgbd_kcf_tracker.metric.decide.account import MISSES, SMALL, Account, absent
 from rgbd_kcf_tracker.metric.decide.cues import Cue, weighed
 from rgbd_kcf_tracker.metric.decide.evidence import (
     FADE,
@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.metric.decide.evidence import (
     probability,
 )
 from rgbd_kcf_tracker.metric.decide.expected_body import ExpectedBody
+from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
 from rgbd_kcf_tracker.metric.decide.parts import FIRST
 from rgbd_kcf_tracker.metric.decide.proposals import (
     MIXED,
@@ -135,6 +136,7 @@ class BySurface:
         here = np.array([(left + right) / 2, top, first.depth])
         placed = self.body.place(first, scene.codes, scene.view, here, None)
         self.motion = self._motion_from(placed)
+        self._neighbours = Neighbours(parameters.speed, parameters.acceleration)
         self._middle = MiddleFilter()
         self._middle.seen(scene.view, first, placed, self.body)
         if stood is None:
@@ -191,6 +193,7 @@ class BySurface:
             for c in self._weighed(account, frame, free, dt, missing)
             if c.evidence.room < STANDING
         ]
+        self._leave_out_neighbours(account, dt)
         self.candidates.sort(key=lambda c: -c.probability)
         if not self.candidates:
             return None
@@ -209,16 +212,9 @@ class BySurface:
     def _alone(self, account: Account, candidates: list[Candidate]) -> Candidate:
         """The best candidate with its probability beside all others: the target is one of them."""
         best, *others = candidates
-        apart = APART * self.body.width
         rivals: list[Candidate] = []
         for other in others:
-            index = account.sight_of(other.seen)
-            if all(
-                math.dist(other.placed.floor, each.placed.floor) > apart
-                and (index < 0 or index != account.sight_of(each.seen))
-                and not other.seen.meets(each.seen)
-                for each in (best, *rivals)
-            ):
+            if all(self._apart(account, other, each) for each in (best, *rivals)):
                 rivals.append(other)
         if not rivals:
             return best
@@ -226,6 +222,32 @@ class BySurface:
         theirs = sum(each.probability / (1 - each.probability) for each in rivals)
         self.contested = theirs / (1 + mine + theirs)
         return dataclasses.replace(best, probability=mine / (1 + mine + theirs))
+
+    def _apart(self, account: Account, one: Candidate, other: Candidate) -> bool:
+        """Whether two candidates are not parts of one."""
+        index = account.sight_of(one.seen)
+        return (
+            math.dist(one.placed.floor, other.placed.floor) > APART * self.body.width
+            and (index < 0 or index != account.sight_of(other.seen))
+            and not one.seen.meets(other.seen)
+        )
+
+    def _leave_out_neighbours(self, account: Account, dt: float) -> None:
+        """Drop the candidates that are what was beside a thing that is followed."""
+        places = [c.placed for c in self.candidates]
+        found = self._neighbours.find(places, self.motion.position, dt)
+        theirs = [self.candidates[index] for index in found]
+        self.candidates = [
+            c for c in self.candidates if all(self._apart(account, c, each) for each in theirs)
+        ]
+
+    def _meet_neighbours(self, account: Account, found: Candidate) -> None:
+        """Remember what else there is, beside a thing that was surely found."""
+        beside: list[Candidate] = []
+        for other in self.candidates:
+            if all(self._apart(account, other, each) for each in (found, *beside)):
+                beside.append(other)
+        self._neighbours.meet([each.placed for each in beside])
 
     def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""
@@ -253,11 +275,11 @@ class BySurface:
         """Who was followed is somebody else: the target has been away for ``gone`` seconds."""
         self.hidden_for, self._misses = gone, MISSES
 
-    def take(self, scene: Scene, found: Candidate, sure: bool) -> Box:
+    def take(self, account: Account, found: Candidate, sure: bool) -> Box:
         """Go on from where the target was found, and learn from it what can be learned.
 
         Args:
-            scene: of the frame.
+            account: of the frame.
             found: what was found.
             sure: whether it is surely the target: else nothing but its place is learned.
 
@@ -266,13 +288,15 @@ class BySurface:
         """
         self.hidden_for = self._gone = 0.0
         self._misses = 0
-        seen, placed = found.seen, found.placed
+        scene, seen, placed = account.scene, found.seen, found.placed
         self._lay = not self.person.gallery.stands(scene.top(seen))
         self.motion.correct(placed.position, placed.sigma)
         if not seen.cut.any:
             self._stood.seen(placed.position, placed.sigma, self._dt)
         if sure:
             self.body.grow(seen)
+            if not self.person.figure and self.person.area >= SMALL:
+                self._meet_neighbours(account, found)
         self._middle.seen(scene.view, seen, placed, self.body)
         since = scene.since
         if sure and since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
@@ -353,6 +377,7 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(moved)
         motion.predict(dt, HIDDEN_NOISE if hidden else 1.0)
+        self._neighbours.predict(dt, moved)
         self._middle.predict(dt, moved)
         if not hidden or not self._parameters.use_particles:
             self._cloud = None

@@ -301,7 +301,7 @@ class Follower:
         whole = whole or self._as_drawn(account, found.seen)
         if whole is not None:
             return self._locked(frame, account, self._anew(account, surface.person, whole), score)
-        box = surface.take(account.scene, found, score >= LEARNED)
+        box = surface.take(account, found, score >= LEARNED)
         self.seen = found.seen
         self._shown = max(self._shown, found.seen.area)
         if self._comeback is not None and self._comeback.doubted:
