@@ -21,7 +21,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import Floats, Image, Mask
 from rgbd_kcf_tracker.frame import Frame, is_reading
-from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.metric.identity.appearance import Appearance, Sighting, share_after
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.flow import TextureFlow
@@ -84,6 +84,8 @@ that much in a tenth of a second at one metre; more of it is mostly somebody who
 COMES = 2.0
 """Metres a second by which it may have come nearer or gone away besides while it was not seen: at a
 brisk walk."""
+CARRIED = 1.0
+"""Seconds without a look after which it may have been carried anywhere."""
 BORNE_OUT = 0.75
 """Share of ``hidden_ratio`` below which what is as near as the target was is not it, either: what
 is turned in a hand looks like itself again in less than a second."""
@@ -99,6 +101,7 @@ class Look:
         peak: the response.
         depth: of the target in metres, None where there is no reading on it.
         moved: whether it is told by what moves alone, as it looks like something else.
+        borne_out: whether depth bears it out, see :meth:`ByLook.step`.
     """
 
     box: Box
@@ -106,6 +109,7 @@ class Look:
     peak: float
     depth: float | None
     moved: bool = False
+    borne_out: bool = False
 
 
 class ByLook:
@@ -151,7 +155,7 @@ class ByLook:
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
-        self._unseen = 0.0
+        self._unseen, self._velocity = 0.0, (0.0, 0.0)
         self.last_depth = self._depth
         self._sure = self._scale, self._depth
         self._turn = True
@@ -186,8 +190,8 @@ class ByLook:
             self._backdrop.see(_averaged(frame), self.last_box.over(_step_of(frame)), dt)
         if self._hidden:
             stands = None if expected is None else self._there(frame, expected)
-            sighting = stands or self._searched(frame, None)
-            self._hidden = stands is None and sighting.ratio < parameters.seen_ratio
+            sighting = stands or self._ahead(frame, self._searched(frame, None))
+            self._hidden = stands is None and sighting.ratio < self._enough(frame, sighting)
         else:
             if self._depthless(frame):
                 self._flow_on(frame)
@@ -197,9 +201,10 @@ class ByLook:
             if there != at and sighting.ratio < UNSURE:  # or it has begun to move
                 moved = self._look_at(frame, *at)
                 sighting = max(sighting, moved, key=lambda each: each.ratio)
+            sighting = self._ahead(frame, sighting)
             if turn and dt > LARGE_STEP and sighting.ratio < UNSURE:
                 other = self._searched(frame, sighting)
-                if other.ratio > max(sighting.ratio + BETTER, parameters.seen_ratio):
+                if other.ratio > max(sighting.ratio + BETTER, self._enough(frame, other)):
                     sighting = other
             self._hidden = sighting.ratio < parameters.hidden_ratio and not (
                 sighting.ratio > BORNE_OUT * parameters.hidden_ratio
@@ -213,14 +218,20 @@ class ByLook:
                 return None
             self._hidden = False
             return look
-        return self._outlined(frame, self._found(frame, sighting, dt), dt)
+        borne_out = self._borne_out(frame, sighting)
+        look = dataclasses.replace(self._found(frame, sighting, dt), borne_out=borne_out)
+        return self._outlined(frame, look, dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
+        # What looks unlike, or is nearer, may be another: its size and its way are not the target's.
+        goes_on = look.depth is None or as_near(look.depth, self.last_depth)
+        self._velocity = 0.0, 0.0
+        if goes_on and self._unseen:
+            across, down = look.box.cx - self.last_box.cx, look.box.cy - self.last_box.cy
+            self._velocity = across / self._unseen, down / self._unseen
         self.last_box, self._unseen = look.box, 0.0
-        # What looks unlike may be another: the size that it has is not the target's.
-        believed = look.ratio > self._parameters.seen_ratio
-        if believed and (look.depth is None or as_near(look.depth, self.last_depth)):
+        if goes_on and look.ratio > self._parameters.seen_ratio:
             self._sure = self._scale, self._depth
             self._relief = Relief.of(frame, look.box)
         self.last_depth = look.depth
@@ -389,6 +400,40 @@ class ByLook:
         off = np.abs(depth - np.float32(self._depth))
         near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
         return grown(near)
+
+    def _ahead(self, frame: Frame, sighting: Sighting) -> Sighting:
+        """What is found, or what is where the target is if it has gone on as before, if likelier.
+
+        It is looked for there for a moment, where what was found is not surely the target.
+        """
+        if sighting.ratio >= UNSURE or self._unseen > CARRIED:
+            return sighting
+        across, down = (each * self._unseen for each in self._velocity)
+        ahead = self._look_at(frame, self.last_box.cx + across, self.last_box.cy + down)
+        if ahead.ratio <= max(sighting.ratio, self._parameters.hidden_ratio):
+            return sighting
+        # Who passes where a target would be is not it, as far as depth can tell.
+        return ahead if self._depthless(frame) or self._borne_out(frame, ahead) else sighting
+
+    def _enough(self, frame: Frame, sighting: Sighting) -> float:
+        """The response against its mean from which what is found elsewhere is the target."""
+        parameters = self._parameters
+        borne_out = self._borne_out(frame, sighting)
+        return parameters.hidden_ratio if borne_out else parameters.seen_ratio
+
+    def _borne_out(self, frame: Frame, sighting: Sighting) -> bool:
+        """Whether what is found stands out in depth, where the target can have got to.
+
+        What is carried looks less like itself before something else.
+        """
+        box = self._box_at(sighting)
+        depth = depth_in(frame, box)
+        if depth is None or self._depth is None or self._unseen > CARRIED:
+            return False
+        camera = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
+        aside = math.hypot(box.cx - self._cx, box.cy - self._cy) * depth / camera.fx
+        in_reach = math.hypot(aside, depth - self._depth) < COMES * self._unseen
+        return in_reach and self._relief.stands_out and Relief.of(frame, box).stands_out
 
     @property
     def _box(self) -> Box:

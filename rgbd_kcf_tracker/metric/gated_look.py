@@ -211,7 +211,9 @@ class GatedLook:
         # but depth says nothing of what has no reading.
         silent = look.depth is None and self._look.last_depth is None
         changed = look.ratio < self._seen_ratio and not silent
-        changed &= not (self._goes_on(account, look) or self._stands_there(account, look))
+        changed &= not (
+            look.borne_out or self._goes_on(account, look) or self._stands_there(account, look)
+        )
         still = self.stood is not None and self.stood.known
         if still and self._look.still_there(frame, look.box) is False:
             return True
@@ -278,10 +280,15 @@ class GatedLook:
         if drawn is not None and drawn.unlike(account.sights[index].view):
             return True
         owner = account.owner_of(index)
-        if owner is None:
+        if owner is None or (drawn is None and self._held(account, look)):
             return False
         beside = owner.chosen or owner.number in self._newcomers.beside
         return self._newcomers.was_there(owner) or (drawn is not None and beside)
+
+    def _held(self, account: Account, look: Look) -> bool:
+        """Whether what is found fits in the hands, and depth bears it out: somebody holds it."""
+        small = _area(account.scene.view, look) < SMALL
+        return small and (look.borne_out or self._goes_on(account, look))
 
     def _of_another(self, account: Account, whole: Silhouette) -> bool:
         """Whether a figure is another target."""

@@ -38,6 +38,8 @@ class Relief:
     (True, False)
     >>> known.left_in(Relief(np.array([np.nan, 0.0]))) is None
     True
+    >>> known.stands_out, Relief(np.array([0.01, np.nan])).stands_out
+    (True, False)
     """
 
     sides: FloatArray
@@ -49,6 +51,11 @@ class Relief:
         starts = (box.x - APART * box.width - wide, box.right + APART * box.width)
         beside = [median_depth(frame, Box(x, rows.y, wide, rows.height)) for x in starts]
         return cls(np.array(beside) - median_depth(frame, rows))
+
+    @property
+    def stands_out(self) -> bool:
+        """Whether it is nearer than what is beside it on some side."""
+        return bool(np.any(self.sides > LEAST))
 
     def left_in(self, now: Relief) -> bool | None:
         """Whether a box still shows what stood out so on some side, None where nothing tells."""
