@@ -56,6 +56,9 @@ shoulder's breadth, as no piece of somebody lies farther from his middle."""
 TOGETHER = 0.15
 """Metres between the middles of two sights that are pieces of one person: less than any chest is
 thick, so that no two stand as near."""
+SAME_COLUMNS = 0.5
+"""Share of the narrower of two silhouettes in whose columns both are, below which they are of two
+who stand beside each other: arms overlap, trunks do not."""
 STRIP = 0.15
 """Metres of a figure beside the part of it that was chosen from which that is somebody else, where
 it is taller than any limb: boxes are not drawn as narrow."""
@@ -127,6 +130,13 @@ class Crowd:
         index = account.figure_of(seen)
         person = account.owner_of(index)
         rest = [] if index < 0 else beside(account.scene, account.sights[index].figure.seen, seen)
+        if person is not None and person.chosen and _is_beside(seen, person, account.time):
+            # Three who touch may be two figures: the middle one, who was chosen, has half of each.
+            other = self._new_at(account, seen, person)
+            if other is not None and not other.chosen:
+                other.chosen = True
+                return other
+            person, index = None, -1
         if person is not None:
             if rest and person.first_seen == account.time:
                 other = self._new_at(account, seen, person)
@@ -498,6 +508,16 @@ def _is_piece(account: Account, column: int) -> bool:
         row >= 0 and np.hypot(*(place - other.figure.place)) < TOGETHER
         for row, other in zip(account.owner, account.sights, strict=True)
     )
+
+
+def _is_beside(seen: Silhouette, person: Person, time: float) -> bool:
+    """Whether a silhouette is mostly on one side of where a person shows at a time."""
+    last = person.last
+    if last is None or person.seen_at != time:
+        return False
+    common = min(seen.cols.stop, last.cols.stop) - max(seen.left, last.left)
+    narrow = min(seen.cols.stop - seen.left, last.cols.stop - last.left)
+    return common < SAME_COLUMNS * narrow
 
 
 def beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:
