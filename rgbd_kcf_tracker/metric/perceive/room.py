@@ -445,6 +445,7 @@ class Room:
         lately = self._time - np.take(self._stood_at, open_) < SETTLE
         left &= ~(lately & (now < stood + noise))
         np.put(self._blind, open_[left], 0)
+        np.put(self.known_for, open_[left], 0)
         # Who passes before somebody does not take his place.
         taken: Mask = ~left
         stands = taken & (np.abs(now - front) < 0.5 * noise) & ~(lately & (now < stood - noise))
