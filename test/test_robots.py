@@ -82,6 +82,14 @@ def robot_behind_a_board(stage: Stage, z: float) -> list[Actor]:
     return [stage.pushed_box(way, (0.4, 0.55, 0.36), 'wood'), _board(stage, z - 0.45, 1.0)]
 
 
+def person_behind_one_who_comes_near(stage: Stage, z: float) -> list[Actor]:
+    """Who walks up to the camera hides him, who has moved by the time that he shows again."""
+    z = 3.4
+    near = [(0, 0.5, z), (0.5, 0.5, z), (3, 0.05, 0.6), (5, 0.05, 0.6), (7.5, -0.5, z)]
+    way = [(0, -0.8, 4.0), (3, -0.8, 4.0), (4.8, 0.6, z), (9, 0.6, z)]
+    return [stage.walk(stage.person(), way), stage.walk(stage.person(), near, [(0, 0)])]
+
+
 def _board(stage: Stage, z: float, high: float) -> Actor:
     """It stands there from the first frame on, and is rolled away."""
     way = [(0, 0.0, z), (3.5, 0.0, z), (4.7, 1.2, z), (9, 1.2, z)]
@@ -137,8 +145,10 @@ def test_a_robot_that_stops_is_no_part_of_the_room(seed: int):
 
 
 @pytest.mark.parametrize('seed', [1, 2])
-@pytest.mark.parametrize('cast', [person_behind_a_board, robot_behind_a_board])
-def test_who_stands_behind_what_is_rolled_away_is_no_part_of_the_room(cast: Cast, seed: int):
+@pytest.mark.parametrize(
+    'cast', [person_behind_a_board, robot_behind_a_board, person_behind_one_who_comes_near]
+)
+def test_who_stands_behind_what_goes_away_is_no_part_of_the_room(cast: Cast, seed: int):
     """What showed behind it passed for the room: he was lost in full view until he walked on."""
     (has,) = followed(staged(cast, seed, 8.0))
     assert len(has) > 40

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from itertools import islice
+from itertools import islice, permutations
 from typing import Any
 
 import cv2
 import numpy as np
 import people_rig
 import pytest
-from people_rig import BLACK, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, picture
+from people_rig import BLACK, BLUE, CAMERA, COLS, GREEN, GREY, RED, ROWS, Someone, picture
 
 from rgbd_kcf_tracker import Box, Frame, Intrinsics, TrackState, create_tracker
 from rgbd_kcf_tracker.errors import BoxError, ImageError, ParameterError
@@ -385,6 +385,17 @@ def test_a_thing_that_is_chosen_twice_in_a_frame_is_one_target():
     assert first == second
     assert len(targets) == 1
     assert targets.update(picture([], STEP, box))[first].box is not None
+
+
+@pytest.mark.parametrize('order', list(permutations(range(3))))
+@pytest.mark.parametrize(('z', 'apart'), [(2.5, 0.34), (2.5, 0.38), (3.0, 0.34)])
+def test_of_three_arm_in_arm_each_is_a_target(z: float, apart: float, order: tuple[int, ...]):
+    """They are two figures, of which the middle one has half of each: the third had his id."""
+    paints = (RED, BLACK), (GREEN, GREY), (BLUE, BLACK)
+    people = [Someone((i - 1) * apart, z + 0.05 * i, *paint) for i, paint in enumerate(paints)]
+    targets = TargetSet('metric')
+    frame = picture(people, 0.0)
+    assert len({targets.add(frame, people[i].box) for i in order}) == 3
 
 
 def test_a_chosen_target_is_not_told_twice():

@@ -224,7 +224,7 @@ class ByLook:
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
         """Have :meth:`settle` learn from what :meth:`step` found."""
-        # What looks unlike, or is nearer, may be another: its size and its way are not the target's.
+        # What looks unlike, or is nearer, may be another, whose size and way are not the target's.
         goes_on = look.depth is None or as_near(look.depth, self.last_depth)
         self._velocity = 0.0, 0.0
         if goes_on and self._unseen:

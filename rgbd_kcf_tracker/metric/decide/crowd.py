@@ -132,16 +132,14 @@ class Crowd:
         rest = [] if index < 0 else beside(account.scene, account.sights[index].figure.seen, seen)
         if person is not None and person.chosen and _is_beside(seen, person, account.time):
             # Three who touch may be two figures: the middle one, who was chosen, has half of each.
-            other = self._new_at(account, seen, person)
-            if other is not None and not other.chosen:
-                other.chosen = True
+            other = self._claimed_at(account, seen, person)
+            if other is not None:
                 return other
             person, index = None, -1
         if person is not None:
             if rest and person.first_seen == account.time:
-                other = self._new_at(account, seen, person)
-                if other is not None and not other.chosen:
-                    other.chosen = True
+                other = self._claimed_at(account, seen, person)
+                if other is not None:
                     return other
                 if not person.chosen and person in self.people:
                     # Nobody: he was made of two, and looks like both.
@@ -170,6 +168,14 @@ class Crowd:
             if near and person is not but and person.first_seen == account.time:
                 return person
         return None
+
+    def _claimed_at(self, account: Account, seen: Silhouette, but: Person) -> Person | None:
+        """The same, chosen from now on; None where it was already."""
+        other = self._new_at(account, seen, but)
+        if other is None or other.chosen:
+            return None
+        other.chosen = True
+        return other
 
     def _welcome_beside(self, account: Account, person: Person, beside: list[Silhouette]) -> None:
         for piece in beside:
@@ -516,8 +522,8 @@ def _is_beside(seen: Silhouette, person: Person, time: float) -> bool:
     if last is None or person.seen_at != time:
         return False
     common = min(seen.cols.stop, last.cols.stop) - max(seen.left, last.left)
-    narrow = min(seen.cols.stop - seen.left, last.cols.stop - last.left)
-    return common < SAME_COLUMNS * narrow
+    narrow = min(seen.mask.shape[1], last.mask.shape[1])
+    return bool(common < SAME_COLUMNS * narrow)
 
 
 def beside(scene: Scene, figure: Silhouette, seen: Silhouette) -> list[Silhouette]:

@@ -26,8 +26,8 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 THERE = 0.5
 """Metres from where somebody was seen last within which what shows may be he: half of what may be
 hidden of him, and by what the camera's own motion is off after a turn."""
-LIKE = 1.0
-"""Log-odds of his look, nearly three to one, from which it is he and not what he stood before."""
+LIKE = 2.0
+"""Log-odds of his look, seven to one, from which it is he and not what he stood before."""
 
 
 def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouette]:
@@ -41,9 +41,7 @@ def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouet
     if not away:
         return []
     moved = scene.stood_for <= SETTLE
-    # A part of him may have shown for a moment, beside what left.
-    gone = {p: time - p.seen_at + RECENT for p in away}
-    if not moved and scene.known_for.min() > max(gone.values()):
+    if not moved and scene.known_for.min() > RECENT:
         return []
     sizes, surfaces = scene.sizes, scene.surfaces
     places = (scene.axes @ np.stack((sizes.x, sizes.y, surfaces.depth))).T
@@ -54,9 +52,10 @@ def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouet
         seen, place = scene.silhouette(label), places[label]
         if moved:
             near = [p for p in away if np.hypot(*(p.place - place)) < THERE]
+        elif np.median(seen.pixels(scene.known_for)) < RECENT:
+            near = [p for p in away if not p.out_of_reach(place, time)]
         else:
-            since = np.median(seen.pixels(scene.known_for))
-            near = [p for p in away if since < gone[p] and not p.out_of_reach(place, time)]
+            continue
         if not near:
             continue
         before = seen.pixels(scene.before)
