@@ -246,8 +246,10 @@ class Crowd:
         if opens is not None:
             for seen in stayed(scene, self.people, time):
                 opens(seen)
-        expected = [p.expected(time) for p in self.people if time - p.seen_at < RECENT]
-        figures = find_figures(scene, np.array(expected).reshape(-1, 2))
+        recent = [p for p in self.people if time - p.seen_at < RECENT]
+        recent.sort(key=lambda p: not p.chosen)
+        expected = np.array([p.expected(time) for p in recent]).reshape(-1, 2)
+        figures = find_figures(scene, expected, sum(p.chosen for p in recent))
         sights = self._sights(scene, figures, time)
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)

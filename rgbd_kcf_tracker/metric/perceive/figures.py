@@ -85,8 +85,12 @@ def depth_step(z: float) -> float:
     return DEPTH_STEP + DEPTH_STEP_PER_METRE * z
 
 
-def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
-    """The figures of a scene; people are ``expected`` at ``(n, 2)`` metres across and deep."""
+def find_figures(scene: Scene, expected: FloatArray, chosen: int = 0) -> list[Figure]:
+    """The figures of a scene.
+
+    People are ``expected`` at ``(n, 2)`` metres across and deep, the first ``chosen`` of them as
+    they were chosen.
+    """
     mask = scene.before & scene.standing
     x, y, width, height = cv2.boundingRect(mask.view(np.uint8))
     if not width:
@@ -109,7 +113,9 @@ def find_figures(scene: Scene, expected: FloatArray) -> list[Figure]:
         left, top, whole = part[1].start + left, part[0].start + top, member[crop]
         parts = [whole]
         if not _has_lain_down(scene, left, top, whole):
-            parts = parted(scene.view, scene.forward, scene.axes[0], left, top, whole, expected)
+            parts = parted(
+                scene.view, scene.forward, scene.axes[0], left, top, whole, expected, chosen
+            )
         for each in parts:
             seen = Silhouette.trimmed(scene.view, left, top, each, scene.rim)
             if seen is None:

@@ -36,6 +36,9 @@ BINS = 24
 """Steps in which depth is divided to tell the two."""
 APART = 0.28
 """Metres between the middles of two people, at the least: a chest is 0.25 m deep."""
+APART_KNOWN = 0.2
+"""The same of people who were chosen, and so are surely several: who hug show the sides that they
+turn away from each other."""
 EVERY = 3
 """One in so many pixels is enough to tell where the middles of people are."""
 LEAST_SHARE = 0.15
@@ -53,6 +56,7 @@ def parted(
     top: int,
     mask: Mask,
     expected: FloatArray = NOBODY,
+    chosen: int = 0,
 ) -> list[Mask]:
     """A mask, or the masks of the people that it is made of, with the same corner.
 
@@ -64,6 +68,7 @@ def parted(
         top: its row.
         mask: ``(rows, cols)`` of somebody, or of several who touch.
         expected: ``(n, 2)`` metres across and deep, where people are expected.
+        chosen: how many of these, the first of them, were chosen.
     """
     k = view.intrinsics
     rows, cols = mask.shape
@@ -76,7 +81,7 @@ def parted(
     lines = np.arange(top, top + rows) - k.cy
     # Where the camera rolls, who stands upright is tilted in the picture.
     x_of, y_of = right[0] / k.fx, right[1] / k.fy
-    seeds = expected
+    seeds, least = expected, APART
     if len(seeds):
         u = seeds[:, 0] / np.maximum(seeds[:, 1], 0.2) - lines[rows // 2] * y_of
         u = u / x_of + k.cx - left
@@ -86,6 +91,8 @@ def parted(
             first, last = np.percentile(ahead[mask], (5, 95))
             inside &= (seeds[:, 1] > first - 0.3) & (seeds[:, 1] < last + 0.3)
         seeds = seeds[inside]
+        if len(seeds) > 1 and not inside[chosen:].any():
+            least = APART_KNOWN
     if len(seeds) < 2 and not narrow:
         seeds = _heads(mask, depth, ahead, columns, lines[0], x_of, y_of, k.fy)
     if len(seeds) < 2 and far is None:
@@ -113,7 +120,7 @@ def parted(
         sums = [np.bincount(owner, some[:, axis]) for axis in (0, 1)]
         seeds = np.stack(sums, axis=1) / count[:, None]
     apart = np.hypot(*((seeds[:, None] - seeds[None]) * reach).transpose(2, 0, 1))
-    if (apart[np.triu_indices(len(seeds), 1)] < APART).any():
+    if (apart[np.triu_indices(len(seeds), 1)] < least).any():
         return [mask]
     owner = _nearest(points, seeds)
     parts = []

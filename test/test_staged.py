@@ -1,7 +1,7 @@
 # Copyright 2026 The rgbd_kcf_tracker authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Things that move: what drives and is lower than anybody, is rolled away, or taken up."""
+"""What no scenario shows: robots, what is rolled away or taken up, and people who hug."""
 
 from __future__ import annotations
 
@@ -90,6 +90,22 @@ def person_behind_one_who_comes_near(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), way), stage.walk(stage.person(), near, [(0, 0)])]
 
 
+def two_who_hug(stage: Stage, z: float) -> list[Actor]:
+    """They come from both sides, and their middles are 0.26 m apart for three seconds."""
+    return [
+        stage.walk(
+            stage.person(),
+            [
+                (0, side * 1.1, z),
+                (0.5, side * 1.1, z),
+                (2.2, side * 0.13, z + 0.04 * side),
+                (5.2, side * 0.13, z + 0.04 * side),
+            ],
+        )
+        for side in (-1, 1)
+    ]
+
+
 def _board(stage: Stage, z: float, high: float) -> Actor:
     """It stands there from the first frame on, and is rolled away."""
     way = [(0, 0.0, z), (3.5, 0.0, z), (4.7, 1.2, z), (9, 1.2, z)]
@@ -161,6 +177,13 @@ def test_of_two_robots_that_cross_each_stays_the_one_it_was(seed: int, count: in
     """The farther went over to the nearer: nobody lower than a person was anybody else."""
     for has in followed(staged(two_of_a_kind, seed, 7.0), count):
         assert len(has) > 40
+        assert sum(has) > 0.9 * len(has)
+
+
+@pytest.mark.parametrize('seed', [2, 3])
+def test_two_targets_who_hug_have_a_box_each(seed: int):
+    """One box was about both of them, at 1.00, and the other target had none."""
+    for has in followed(staged(two_who_hug, seed, 5.0), 2):
         assert sum(has) > 0.9 * len(has)
 
 
