@@ -232,9 +232,14 @@ def test_bad_values_say_what_to_write(
     assert 'what follows info is empty' in fails(capsys, 'info', '')
     assert 'X,Y,W,H' in fails(capsys, *track, '--init', '1,2,3')
     assert 'X,Y,W,H' in fails(capsys, *track, '--init', 'a,b,c,d')
-    assert 'has no size' in fails(capsys, *track, '--init', '10,10,0,5')
-    assert 'has no size' in fails(capsys, *track, '--init', '10,10,-4,5')
-    assert 'finite' in fails(capsys, *track, '--init', 'nan,10,4,5')
+    for box, why in (
+        ('10,10,0,5', 'has no size'),
+        ('10,10,-4,5', 'has no size'),
+        ('nan,10,4,5', 'must be finite'),
+    ):
+        said = fails(capsys, *track, '--init', box)
+        assert f'--init {box!r}' in said
+        assert why in said
     assert 'lies outside the 160x120' in fails(capsys, *track, '--init', '500,10,20,20')
     assert 'lies outside' in fails(capsys, *track, '--init', '-50,10,20,20')
     assert 'reaches too far' in fails(capsys, *track, '--init', '10,10,4294967246,20')

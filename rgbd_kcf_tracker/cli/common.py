@@ -212,7 +212,10 @@ def parse_box(text: str) -> Box:
         raise BoxError(
             f'--init {text!r} is no box: write X,Y,W,H in pixels, such as 300,120,80,200'
         )
-    return Box(*numbers)
+    try:
+        return Box(*numbers)
+    except BoxError as error:
+        raise BoxError(f'--init {text!r}: {error}') from None
 
 
 def parse_size(text: str) -> tuple[int, int]:

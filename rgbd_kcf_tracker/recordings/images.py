@@ -247,7 +247,7 @@ def decode_depth_bytes(
     if kind in (PNG, TIFF):
         return _bare_depth(data, max_pixels, refused)
     if len(data) <= _COMPRESSED_DEPTH_HEADER.size:
-        raise ImageError(f'compressed depth has only {len(data)} bytes: the message is cut off')
+        raise ImageError(f'compressed depth has only {len(data)} bytes: it is cut off')
     _, a, b = _COMPRESSED_DEPTH_HEADER.unpack_from(data)
     body = data[_COMPRESSED_DEPTH_HEADER.size :]
     if sniff(body) == PNG:
@@ -255,7 +255,7 @@ def decode_depth_bytes(
     elif 'rvl' in text.lower() or 'png' not in text.lower():
         values = rvl.decode(body, max_pixels)
     else:
-        raise ImageError(f'compressed depth {text!r} holds no PNG: the message is damaged')
+        raise ImageError(f'compressed depth {text!r} holds no PNG: it is damaged')
     if pixel_format(text) != '32FC1':
         return metres_from_mm(values)
     return _metres_from_inverse(values, a, b, refused)
