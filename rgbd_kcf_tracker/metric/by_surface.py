@@ -136,7 +136,7 @@ class BySurface:
         here = np.array([(left + right) / 2, top, first.depth])
         placed = self.body.place(first, scene.codes, scene.view, here, None)
         self.motion = self._motion_from(placed)
-        self._neighbours = Neighbours(parameters.speed, parameters.acceleration)
+        self._neighbours: Neighbours | None = Neighbours(parameters.speed, parameters.acceleration)
         self._middle = MiddleFilter()
         self._middle.seen(scene.view, first, placed, self.body)
         if stood is None:
@@ -168,8 +168,9 @@ class BySurface:
         self.was_away = absent(self.hidden_for + dt, self._misses)
         self.contested = 0.0
         self._dt = dt
-        if self.person.figure:
+        if self.person.figure:  # who is told from others by the account, and moves by himself
             self._stood.moves()
+            self._neighbours = None
         self._stood.carried(scene.way, dt)
         self._predict(dt, scene.motion if isinstance(scene.motion, Pose) else None)
         if self._cloud is not None:
@@ -234,6 +235,8 @@ class BySurface:
 
     def _leave_out_neighbours(self, account: Account, dt: float) -> None:
         """Drop the candidates that are what was beside a thing that is followed."""
+        if self._neighbours is None:
+            return
         places = [c.placed for c in self.candidates]
         found = self._neighbours.find(places, self.motion.position, dt)
         theirs = [self.candidates[index] for index in found]
@@ -242,7 +245,9 @@ class BySurface:
         ]
 
     def _meet_neighbours(self, account: Account, found: Candidate) -> None:
-        """Remember what else there is, beside a thing that was surely found."""
+        """Remember what else there is, beside a thing that was surely found and is not held."""
+        if self._neighbours is None or self.person.figure or self.person.area < SMALL:
+            return
         beside: list[Candidate] = []
         for other in self.candidates:
             if all(self._apart(account, other, each) for each in (found, *beside)):
@@ -295,8 +300,7 @@ class BySurface:
             self._stood.seen(placed.position, placed.sigma, self._dt)
         if sure:
             self.body.grow(seen)
-            if not self.person.figure and self.person.area >= SMALL:
-                self._meet_neighbours(account, found)
+            self._meet_neighbours(account, found)
         self._middle.seen(scene.view, seen, placed, self.body)
         since = scene.since
         if sure and since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
@@ -377,7 +381,8 @@ class BySurface:
             if self._cloud is not None:
                 self._cloud.carried(moved)
         motion.predict(dt, HIDDEN_NOISE if hidden else 1.0)
-        self._neighbours.predict(dt, moved)
+        if self._neighbours is not None:
+            self._neighbours.predict(dt, moved)
         self._middle.predict(dt, moved)
         if not hidden or not self._parameters.use_particles:
             self._cloud = None
