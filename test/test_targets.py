@@ -398,6 +398,21 @@ def test_of_three_arm_in_arm_each_is_a_target(z: float, apart: float, order: tup
     assert len({targets.add(frame, people[i].box) for i in order}) == 3
 
 
+def test_who_was_a_figure_once_has_no_neighbours():
+    """In a frame in which he was in none he met who stood beside him, and was not known there."""
+    targets = TargetSet('metric')
+    number = targets.add(both(0), left(0).box)
+    metric = targets.metric
+    assert metric is not None
+    targets.update(both(1))
+    surface = metric._followers[number]._surface
+    assert surface is not None
+    assert surface.person.figure
+    surface.person.figure = False
+    targets.update(both(2))
+    assert surface._neighbours is None
+
+
 def test_a_chosen_target_is_not_told_twice():
     targets = TargetSet('metric')
     targets.everyone = True
