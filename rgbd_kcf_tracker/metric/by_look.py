@@ -101,7 +101,7 @@ class Look:
         peak: the response.
         depth: of the target in metres, None where there is no reading on it.
         moved: whether it is told by what moves alone, as it looks like something else.
-        borne_out: whether depth bears it out, see :meth:`ByLook.step`.
+        stands_out: whether it stands out in depth where the target can have got to.
     """
 
     box: Box
@@ -109,7 +109,7 @@ class Look:
     peak: float
     depth: float | None
     moved: bool = False
-    borne_out: bool = False
+    stands_out: bool = False
 
 
 class ByLook:
@@ -218,8 +218,8 @@ class ByLook:
                 return None
             self._hidden = False
             return look
-        borne_out = self._borne_out(frame, sighting)
-        look = dataclasses.replace(self._found(frame, sighting, dt), borne_out=borne_out)
+        stands_out = self._stands_out(frame, sighting)
+        look = dataclasses.replace(self._found(frame, sighting, dt), stands_out=stands_out)
         return self._outlined(frame, look, dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
@@ -413,27 +413,29 @@ class ByLook:
         if ahead.ratio <= max(sighting.ratio, self._parameters.hidden_ratio):
             return sighting
         # Who passes where a target would be is not it, as far as depth can tell.
-        return ahead if self._depthless(frame) or self._borne_out(frame, ahead) else sighting
+        return ahead if self._depthless(frame) or self._stands_out(frame, ahead) else sighting
 
     def _enough(self, frame: Frame, sighting: Sighting) -> float:
         """The response against its mean from which what is found elsewhere is the target."""
         parameters = self._parameters
-        borne_out = self._borne_out(frame, sighting)
-        return parameters.hidden_ratio if borne_out else parameters.seen_ratio
+        stands_out = self._stands_out(frame, sighting)
+        return parameters.hidden_ratio if stands_out else parameters.seen_ratio
 
-    def _borne_out(self, frame: Frame, sighting: Sighting) -> bool:
+    def _stands_out(self, frame: Frame, sighting: Sighting) -> bool:
         """Whether what is found stands out in depth, where the target can have got to.
 
         What is carried looks less like itself before something else.
         """
+        if self._depth is None or self._unseen > CARRIED or not self._relief.stands_out:
+            return False
         box = self._box_at(sighting)
         depth = depth_in(frame, box)
-        if depth is None or self._depth is None or self._unseen > CARRIED:
+        if depth is None:
             return False
         camera = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
         aside = math.hypot(box.cx - self._cx, box.cy - self._cy) * depth / camera.fx
         in_reach = math.hypot(aside, depth - self._depth) < COMES * self._unseen
-        return in_reach and self._relief.stands_out and Relief.of(frame, box).stands_out
+        return in_reach and Relief.of(frame, box).stands_out
 
     @property
     def _box(self) -> Box:

@@ -213,16 +213,23 @@ class BySurface:
     def _alone(self, account: Account, candidates: list[Candidate]) -> Candidate:
         """The best candidate with its probability beside all others: the target is one of them."""
         best, *others = candidates
-        rivals: list[Candidate] = []
-        for other in others:
-            if all(self._apart(account, other, each) for each in (best, *rivals)):
-                rivals.append(other)
+        rivals = self._beside(account, best, others)
         if not rivals:
             return best
         mine = best.probability / (1 - best.probability)
         theirs = sum(each.probability / (1 - each.probability) for each in rivals)
         self.contested = theirs / (1 + mine + theirs)
         return dataclasses.replace(best, probability=mine / (1 + mine + theirs))
+
+    def _beside(
+        self, account: Account, found: Candidate, others: list[Candidate]
+    ) -> list[Candidate]:
+        """Those of the others that are no part of what was found, nor of each other."""
+        beside: list[Candidate] = []
+        for other in others:
+            if all(self._apart(account, other, each) for each in (found, *beside)):
+                beside.append(other)
+        return beside
 
     def _apart(self, account: Account, one: Candidate, other: Candidate) -> bool:
         """Whether two candidates are not parts of one."""
@@ -248,11 +255,8 @@ class BySurface:
         """Remember what else there is, beside a thing that was surely found and is not held."""
         if self._neighbours is None or self.person.figure or self.person.area < SMALL:
             return
-        beside: list[Candidate] = []
-        for other in self.candidates:
-            if all(self._apart(account, other, each) for each in (found, *beside)):
-                beside.append(other)
-        self._neighbours.meet([each.placed for each in beside])
+        beside = self._beside(account, found, self.candidates)
+        self._neighbours.meet(each.placed for each in beside)
 
     def belief(self) -> Belief | None:
         """Where the target is believed to be now: by the particles while it is hidden."""

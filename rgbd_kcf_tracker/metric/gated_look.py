@@ -212,7 +212,7 @@ class GatedLook:
         silent = look.depth is None and self._look.last_depth is None
         changed = look.ratio < self._seen_ratio and not silent
         changed &= not (
-            look.borne_out or self._goes_on(account, look) or self._stands_there(account, look)
+            look.stands_out or self._goes_on(account, look) or self._stands_there(account, look)
         )
         still = self.stood is not None and self.stood.known
         if still and self._look.still_there(frame, look.box) is False:
@@ -288,7 +288,7 @@ class GatedLook:
     def _held(self, account: Account, look: Look) -> bool:
         """Whether what is found fits in the hands, and depth bears it out: somebody holds it."""
         small = _area(account.scene.view, look) < SMALL
-        return small and (look.borne_out or self._goes_on(account, look))
+        return small and (look.stands_out or self._goes_on(account, look))
 
     def _of_another(self, account: Account, whole: Silhouette) -> bool:
         """Whether a figure is another target."""

@@ -353,9 +353,8 @@ class MetricTargets:
         self._reader.lately = self.account.lately()
         # What a camera that moves sees for the first time, behind something, passes for the room.
         if self._reader.stood_for < SETTLE:
-            for number, seen in targets.items():
-                if seen is not None and number not in unsure:
-                    self._reader.is_somebody(seen)
+            for seen in surely:
+                self._reader.is_somebody(seen)
             # And what had somebody's shape while only a part of it was in view may be room.
             for person, seen in self.account.unmoved:
                 if self._reader.is_room(seen, self.account.scene):

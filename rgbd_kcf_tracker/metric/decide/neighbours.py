@@ -60,6 +60,8 @@ class Neighbours:
         Each is where it is expected, and nearer to that than to the ``target``, ``(3,)`` metres.
         """
         found: list[int] = []
+        for each in self._known:
+            each.missed += dt
         if self._known and places:
             at = np.stack([each.position for each in places])
             expected = np.stack([each.motion.position for each in self._known])
@@ -71,9 +73,7 @@ class Neighbours:
                     found.append(column)
                     neighbour, place = self._known[row], places[column]
                     neighbour.motion.correct(place.position, place.sigma)
-                    neighbour.missed = -dt
-        for each in self._known:
-            each.missed += dt
+                    neighbour.missed = 0.0
         self._known = [each for each in self._known if each.missed < FORGET]
         return found
 

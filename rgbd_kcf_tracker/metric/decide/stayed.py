@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rgbd_kcf_tracker.metric.decide.account import MOST, RECENT, look_of
+from rgbd_kcf_tracker.metric.decide.account import MOST, look_of
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_AREA
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
@@ -26,6 +26,9 @@ from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 THERE = 0.5
 """Metres from where somebody was seen last within which what shows may be he: half of what may be
 hidden of him, and by what the camera's own motion is off after a turn."""
+SHOWN = 0.6
+"""Seconds since something left within which what it has shown is held against those who are away:
+some frames at 5 Hz. Who is not he by then is the room."""
 LIKE = 2.0
 """Log-odds of his look, seven to one, from which it is he and not what he stood before."""
 
@@ -34,14 +37,14 @@ def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouet
     """What passes for the room where a target is that is not in view, and looks as it does.
 
     Before a camera that moved it is where he was seen last; before one that stands, what something
-    shows that has left since. The places of ``people`` are as the camera stands now, at ``time`` in
+    shows that has just left. The places of ``people`` are as the camera stands now, at ``time`` in
     seconds.
     """
     away = [p for p in people if p.chosen and p.misses and p.gallery.views]
     if not away:
         return []
     moved = scene.stood_for <= SETTLE
-    if not moved and scene.known_for.min() > RECENT:
+    if not moved and scene.known_for.min() > SHOWN:
         return []
     sizes, surfaces = scene.sizes, scene.surfaces
     places = (scene.axes @ np.stack((sizes.x, sizes.y, surfaces.depth))).T
@@ -49,14 +52,15 @@ def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouet
     possible[0] = False
     found = []
     for label in np.flatnonzero(possible).tolist():
-        seen, place = scene.silhouette(label), places[label]
+        place = places[label]
         if moved:
             near = [p for p in away if np.hypot(*(p.place - place)) < THERE]
-        elif np.median(seen.pixels(scene.known_for)) < RECENT:
-            near = [p for p in away if not p.out_of_reach(place, time)]
         else:
-            continue
+            near = [p for p in away if not p.out_of_reach(place, time)]
         if not near:
+            continue
+        seen = scene.silhouette(label)
+        if not moved and np.median(seen.pixels(scene.known_for)) >= SHOWN:
             continue
         before = seen.pixels(scene.before)
         if np.count_nonzero(before) >= MOST * len(before):
