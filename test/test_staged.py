@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.simulation.actors import FacesActor, mug
 from rgbd_kcf_tracker.simulation.build import kinect2_intrinsics
 from rgbd_kcf_tracker.simulation.motion import Motion
 from rgbd_kcf_tracker.simulation.room import table
-from rgbd_kcf_tracker.simulation.sequence import SimulatedSequence
+from rgbd_kcf_tracker.simulation.sequence import EPOCH_NS, SimulatedSequence
 from rgbd_kcf_tracker.simulation.stage import Stage, route
 from rgbd_kcf_tracker.simulation.world import Actor
 
@@ -106,6 +106,14 @@ def two_who_hug(stage: Stage, z: float) -> list[Actor]:
     ]
 
 
+def one_who_comes_back_after_ten_others(stage: Stage, z: float) -> list[Actor]:
+    """He goes out on the left; ten cross the room, one after another, before he comes back."""
+    edge, near = 3.4, 2.4
+    way = [(0, -0.5, z), (2.5, -0.5, z), (4.5, -edge, z), (29, -edge, z), (31, 0.2, z)]
+    ways = [[(3 + 2.5 * k, edge, near), (7 + 2.5 * k, -edge, near)] for k in range(10)]
+    return [stage.walk(stage.person(), each) for each in (way, *ways)]
+
+
 def _board(stage: Stage, z: float, high: float) -> Actor:
     """It stands there from the first frame on, and is rolled away."""
     way = [(0, 0.0, z), (3.5, 0.0, z), (4.7, 1.2, z), (9, 1.2, z)]
@@ -185,6 +193,24 @@ def test_two_targets_who_hug_have_a_box_each(seed: int):
     """One box was about both of them, at 1.00, and the other target had none."""
     for has in followed(staged(two_who_hug, seed, 5.0), 2):
         assert sum(has) > 0.9 * len(has)
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_who_was_chosen_is_known_again_however_many_others_came(seed: int):
+    """What spoke against his return grew with each of them, beyond what any look can say for it."""
+    targets, number = TargetSet('metric'), 0
+    scores: list[float] = []
+    for sample in staged(one_who_comes_back_after_ten_others, seed, 36.0, rate_hz=4.0):
+        if not number:
+            assert sample.visible is not None
+            number = targets.add(sample.frame, sample.visible)
+            continue
+        track = targets.update(sample.frame)[number]
+        if sample.frame.stamp_ns - EPOCH_NS > 32e9:
+            assert sample.visible is not None
+            his = track.box is not None and track.box.iou(sample.visible) > 0.5
+            scores.append(track.score if his else 0.0)
+    assert sum(score > 0.5 for score in scores) > 0.9 * len(scores)
 
 
 def at(x: float, z: float) -> Placed:

@@ -338,7 +338,7 @@ class Follower:
         # but a thing that was in view until the camera paused is hardly another one.
         part = person.figure and surface.hidden_for > 0
         new = account.owner[index] < 0 if index >= 0 else part
-        against = account.against * away(account.time - person.seen_at)
+        against = account.against_chosen * away(account.time - person.seen_at)
         if new or (stranger is not None and not _recognised(stranger, person, account.time)):
             box = surface.box(account.scene, found)
             belief = surface.glimpse(account.scene, found)
@@ -574,7 +574,7 @@ class Follower:
         index = max(likely, key=lambda each: likely[each][0])
         mine, stranger = likely[index]
         sight = account.sights[index]
-        against = account.against * away(account.time - person.seen_at)
+        against = account.against_chosen * away(account.time - person.seen_at)
         others = math.exp(against) + account.as_others(person, index)
         score = mine / (sum(odds for odds, _ in likely.values()) + others)
         # Nor is of a fragment seen past somebody else known how large he is, who is to be followed.

@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.describer import Describer
-from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
+from rgbd_kcf_tracker.metric.identity.gallery import SUREST_PART, Compared, View
 from rgbd_kcf_tracker.metric.identity.person import COAST, FALLS, TRAVELLED, Person
 from rgbd_kcf_tracker.metric.perceive.fading import Lately
 from rgbd_kcf_tracker.metric.perceive.figures import Figure, place_of
@@ -151,6 +151,14 @@ class Account:
             for person, index in self.in_view.items()
             if not person.chosen and person.travelled < TRAVELLED
         ]
+
+    @property
+    def against_chosen(self) -> float:
+        """:attr:`against` of who was chosen: he is waited for, however many others come.
+
+        What looks can say is bounded, so this is, too: else he would be somebody new for good.
+        """
+        return min(self.against, SUREST_PART)
 
     def was_away(self, person: Person) -> bool:
         """Whether somebody has been absent for so long that his place says little."""
