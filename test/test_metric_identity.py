@@ -71,13 +71,20 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
     Looks,
     View,
     _Learned,
-    height_log_odds,
     look_log_odds,
     same_person,
     similarity,
 )
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
 from rgbd_kcf_tracker.metric.identity.relief import Relief
+from rgbd_kcf_tracker.metric.identity.stature import (
+    NEWEST,
+    TOLD,
+    WALKED,
+    Height,
+    Stature,
+    height_log_odds,
+)
 from rgbd_kcf_tracker.metric.identity.stood import (
     CARRIED_OFF,
     CHOSEN_MOVING,
@@ -85,10 +92,17 @@ from rgbd_kcf_tracker.metric.identity.stood import (
     SUDDENLY,
     Stood,
 )
-from rgbd_kcf_tracker.metric.identity.tally import SUREST, logit
+from rgbd_kcf_tracker.metric.identity.tally import SUREST, Heard, logit
 from rgbd_kcf_tracker.metric.initialisation import surface_of
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, TINTS, ColorCodes, color_codes, palette
+from rgbd_kcf_tracker.metric.perceive.colors import (
+    CODES,
+    LIGHTNESS,
+    TINTS,
+    ColorCodes,
+    color_codes,
+    palette,
+)
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
@@ -307,6 +321,70 @@ def test_height_speaks_for_the_same_and_against_another():
     assert -4 < height_log_odds(0.95, 1.8) < -2.5
 
 
+def walked(top: float, count: int = 10, distance: float = 3.0, start: float = 0.0) -> Stature:
+    """Of somebody who has walked for so many steps."""
+    stature = Stature()
+    for n in range(count):
+        stature.learn(Height(top, distance, start + 0.1 * n), walks=True)
+    return stature
+
+
+def test_nobody_is_taller_than_he_walks_and_who_walks_is_as_tall():
+    known = walked(1.7)
+    assert known.log_odds(None, 3.0) == 0.0
+    # Most people are about as tall: a height that fits says as little as before.
+    for walks in (1.7, None):
+        assert known.log_odds(1.7, 3.0, walks) == height_log_odds(1.7, 1.7)
+    assert known.log_odds(1.85, 3.0) < -2.5
+    assert known.log_odds(1.85, 3.0, 1.85) < -2.5
+    assert known.log_odds(1.55, 3.0, 1.55) < -2.5
+    # Who has not walked may have bent down, or sit, and one height of many may be wrong.
+    assert known.log_odds(1.55, 3.0) == height_log_odds(1.55, 1.7) > -0.5
+    assert known.log_odds(1.55, 3.0, 1.7) == height_log_odds(1.55, 1.7)
+
+
+def test_how_tall_somebody_walks_is_known_after_some_steps_and_better_after_more():
+    few = walked(1.7, TOLD - 1)
+    assert few.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
+    some, many = (walked(1.7, n).log_odds(1.85, 3.0) for n in (TOLD, 20))
+    assert many < some < height_log_odds(1.85, 1.7)
+    # Heights within a tenth of a second are of one step.
+    quick = Stature()
+    for n in range(TOLD * 2):
+        quick.learn(Height(1.7, 3.0, n / 30), walks=True)
+    assert quick.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
+    assert quick.of_late(0.2) is None
+    assert walked(1.7).of_late(1.0) == 1.7
+    assert walked(1.7).of_late(3.0) is None
+
+
+def test_a_floor_out_of_true_makes_heights_at_another_distance_say_less():
+    known = walked(1.7)
+    near, far = (known.log_odds(1.85, distance) for distance in (3.0, 5.0))
+    assert near < -2.5
+    assert far > -1
+    known.take(walked(1.7, distance=5.0, start=9.0))
+    assert known.log_odds(1.85, 5.0) < -2.5
+    # What is known of it there is what is held against.
+    sloping = walked(1.7)
+    sloping.take(walked(1.85, distance=5.0, start=9.0))
+    assert sloping.log_odds(1.85, 5.0) > 0
+    assert sloping.log_odds(1.85, 3.0) < -2.5
+
+
+def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them():
+    stature = walked(1.7, WALKED * 2)
+    for n in range(WALKED * 2):
+        stature.learn(Height(1.5, 3.0, 100 + 0.1 * n), walks=True)
+    assert len(stature._walked) == WALKED
+    assert len(stature._newest) == NEWEST
+    assert stature.top == 1.5
+    assert stature.log_odds(1.85, 3.0, before=100.0) < -2.5
+    late = stature.taken_back(100.0)
+    assert (stature.top, late.top) == (None, 1.5)
+    assert stature.log_odds(1.5, 3.0, walks=1.5) < -2.5 < late.log_odds(1.5, 3.0, walks=1.5)
+
+
 def test_what_one_view_does_not_show_is_as_in_the_others():
     """Who was seen above a desk has not the trousers of anybody, if they are known."""
     upper, whole = look(RED, BLUE, rows=0.5), look(DARK_RED, BLUE)
@@ -368,30 +446,30 @@ def test_a_view_of_all_of_him_takes_the_place_of_a_part_that_looks_the_same():
 def test_a_copy_of_a_gallery_learns_for_itself():
     gallery = Gallery()
     gallery.learn(look(RED), 0.0)
-    gallery.learn_height(1.7, 0.0)
+    gallery.stature.learn(Height(1.7, 2.0, 0.0))
     same = gallery.copy()
     gallery.learn(look(GREEN), 1.0)
-    gallery.learn_height(1.9, 1.0)
-    assert (len(same.views), same.top) == (1, 1.7)
-    assert (len(gallery.views), gallery.top) == (2, pytest.approx(1.8))
+    gallery.stature.learn(Height(1.9, 2.0, 1.0))
+    assert (len(same.views), same.stature.top) == (1, 1.7)
+    assert (len(gallery.views), gallery.stature.top) == (2, pytest.approx(1.8))
     assert same.log_odds(look(GREEN)) < gallery.log_odds(look(GREEN))
 
 
 def test_the_height_of_a_gallery_is_a_median_of_the_newest():
     gallery = Gallery()
-    assert gallery.top is None
+    assert gallery.stature.top is None
     for time, top in enumerate([1.1, 1.1, *[1.8] * 40, *[1.5] * 40]):
-        gallery.learn_height(top, time)
+        gallery.stature.learn(Height(top, 2.0, time))
         if time == 41:
-            assert gallery.top == pytest.approx(1.8)
-    assert gallery.top == pytest.approx(1.5)
+            assert gallery.stature.top == pytest.approx(1.8)
+    assert gallery.stature.top == pytest.approx(1.5)
 
 
 def test_what_a_gallery_learned_of_somebody_else_is_taken_back_and_given_to_him():
     gallery, other = Gallery(), Gallery()
     for time, shirt, top in ((0.0, RED, 1.6), (1.0, BLUE, 1.6), (2.0, GREEN, 1.9)):
         gallery.learn(look(shirt), time)
-        gallery.learn_height(top, time)
+        gallery.stature.learn(Height(top, 2.0, time))
     green = look(GREEN)
     assert gallery.looks is not None
     alike = Compared.of(green, gallery.looks).likeness()
@@ -403,10 +481,10 @@ def test_what_a_gallery_learned_of_somebody_else_is_taken_back_and_given_to_him(
     other.take(gallery.taken_back(2.0))
     assert len(gallery.views) == 2
     assert gallery.log_odds(green) == pytest.approx(before)
-    assert gallery.top == pytest.approx(1.6)
+    assert gallery.stature.top == pytest.approx(1.6)
     assert len(other.views) == 1
     assert other.log_odds(green) > 0
-    assert other.top == pytest.approx(1.9)
+    assert other.stature.top == pytest.approx(1.9)
     assert Gallery().taken_back(0.0).looks is None
 
 
@@ -688,7 +766,7 @@ def test_whom_a_camera_that_moves_has_lost_does_not_come_back_as_a_desk(
     """Who had gone out of view was taken for a table before which nobody stood any more."""
     reader, crowd = SceneReader(COLS, 0.04, 0.03, 0.0), Crowd()
     person = crowd.welcome(np.array([-1.1, 2.0]), 0.0)
-    person.gallery.learn_height(known, 0.0)
+    person.gallery.stature.learn(Height(known, 2.0, 0.0))
     for i in range(1, 9):
         color, depth = images([])
         if i > 7:
@@ -767,37 +845,63 @@ def test_who_stands_does_not_travel_before_a_camera_that_is_tilted_and_turns(rol
     assert one.travelled < 0.1
 
 
+def resemble(one: Person, number: int, odds: float, weight: float, time: float = 0.0) -> None:
+    """Somebody resembles another by so much, and shows as the weight says, without his head."""
+    area = np.zeros(SLICES, np.float32)
+    area[0] = WHOLE_AREA * math.sqrt(weight)
+    roots = np.zeros((SLICES, LIGHTNESS, TINTS * TINTS), np.float32)
+    view = View(roots, area, np.ones(SLICES, np.float32), None)
+    one.resembled(Person(number, np.zeros(2), 0.0), odds, view, time)
+
+
 def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     one = Person(1, np.zeros(2), 0.0)
     assert one.resemblance(7) is None
     for odds in (3.0, -1.0, 1.0):
-        one.resembled(7, odds, 1.0, 0.0)
+        resemble(one, 7, odds, 1.0, 0.0)
     assert one.resemblance(7) == pytest.approx(1.0)
-    one.resembled(7, -100.0, 0.0, 0.0)
+    resemble(one, 7, -100.0, 0.0, 0.0)
     assert one.resemblance(7) == pytest.approx(1.0)
     # More sightings say more, but by far not as many times more.
     assert 1.0 < one.resembles(7) < 2.0
     assert one.resembles(8) == 0.0
-    one.resembled(9, 2.0, 0.5, 0.0)
+    resemble(one, 9, 2.0, 0.5, 0.0)
     assert one.resembles(9) == 0.0, 'half a sighting is too little to go by for good'
     assert one.resembles(9, enough=0.0) == pytest.approx(2.0)
     # What was seen long ago, when little of him showed, says no more who he is.
     for time in (20.0, 20.5, 21.0):
-        one.resembled(7, -2.0, 1.0, time)
+        resemble(one, 7, -2.0, 1.0, time)
     assert one.resemblance(7) == pytest.approx(-2.0, abs=0.01)
+
+
+def test_how_tall_somebody_turns_out_to_be_counts_for_what_was_seen_of_him_before():
+    heard = Heard()
+    assert heard.mean is None
+    for n in range(5):  # he comes in, and may have bent down
+        heard.hear(3.6, 1.0, 0.2 * n, height=-0.4, told=False)
+    assert heard.mean == pytest.approx(3.6)
+    heard.hear(-0.4, 1.0, 1.0, height=-4.4, told=True)
+    assert heard.mean == pytest.approx(-0.4)
+    # Who stands still after that is no taller for it; who is as tall after all is heard.
+    for n in range(6, 10):
+        heard.hear(3.6, 1.0, 0.2 * n, height=-0.4, told=False)
+    assert heard.mean == pytest.approx(-0.4)
+    for n in range(10, 30):
+        heard.hear(4.2, 1.0, 0.2 * n, height=0.2, told=True)
+    assert heard.mean == pytest.approx(4.2, abs=0.2)
 
 
 def test_somebody_is_any_of_those_he_is_like_but_none_whom_he_met_and_none_of_them_twice():
     one = Person(1, np.zeros(2), 0.0)
     assert one.seen_before({7: 1.0}) == -np.inf, 'he was compared with nobody'
-    one.resembled(7, 3.0, 1.0, 0.0)
-    one.resembled(8, 3.0, 1.0, 0.0)
+    resemble(one, 7, 3.0, 1.0, 0.0)
+    resemble(one, 8, 3.0, 1.0, 0.0)
     assert one.seen_before({7: 1.0}) == pytest.approx(3.0)
     assert one.seen_before({7: 1.0, 8: 1.0}) == pytest.approx(3.0 + np.log(2))
     assert one.seen_before({7: 1.0, 8: 0.0}) == pytest.approx(3.0), 'the one is the other'
     one.met.add(7)
     assert one.seen_before({7: 1.0, 8: 0.5}) == pytest.approx(3.0 - np.log(2))
-    one.resembled(9, 3.0, 0.1, 0.0)
+    resemble(one, 9, 3.0, 0.1, 0.0)
     assert one.seen_before({9: 1.0}) < 1.0, 'a tenth of somebody says little of who he is'
 
 
@@ -1096,7 +1200,7 @@ def test_the_score_of_a_return_counts_how_seldom_anybody_comes_back_and_who_else
     person, _ = returned(red)
     odds, against, known = np.exp(person.gallery.log_odds(red)), 1.7, 20.0
     likely = Comeback(person, 10.0, against).hear(red, {}, known, 10.0)
-    assert likely.looks == pytest.approx(odds / (1 + odds))
+    assert likely.looks == pytest.approx(odds / (1 + known + odds))
     assert likely.score == pytest.approx(odds / (np.exp(against) + known + odds))
 
 
@@ -1292,7 +1396,7 @@ def test_nobody_becomes_one_who_has_just_become_another():
         later.first_seen = earlier.seen_at + 1.0
         later.again = 30.0
         for _ in range(3):
-            later.resembled(earlier.number, 29.0, 1.0, watched.time)
+            resemble(later, earlier.number, 29.0, 1.0, watched.time)
     account.people = [one, two, three]
     account.owner = [2]
     watched.crowd._reunite(account)
@@ -1640,7 +1744,7 @@ def test_the_crowd_is_bounded_and_forgets_no_one_who_was_chosen():
     for i in range(3 * MOST_PEOPLE):
         one = crowd.welcome(np.zeros(2), 1.0 + i)
         one.meet(chosen)
-        chosen.resembled(one.number, 1.0, 1.0, 1.0 + i)
+        resemble(chosen, one.number, 1.0, 1.0, 1.0 + i)
     assert len(crowd.people) == MOST_PEOPLE + 1
     assert chosen.met == {person.number for person in crowd.people} - {1, 2}
     assert set(chosen._resembles) == chosen.met, 'nothing grows with who came and went'

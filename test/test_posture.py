@@ -20,6 +20,7 @@ from people_rig import BLACK, CAMERA, COLS, RED, ROWS, SKIN, WALL, Someone, imag
 from rgbd_kcf_tracker import Box, Frame, TrackState, create_tracker
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.stature import Height
 from rgbd_kcf_tracker.metric.perceive.colors import ColorCodes
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, grown
 from rgbd_kcf_tracker.metric.perceive.fading import ABOUT, Lately, around, fading
@@ -342,7 +343,7 @@ def test_who_is_half_as_high_as_he_stands_is_not_compared_with_that():
     one = Person(1, np.zeros(2), 0.0)
     one.gallery.learn(view, 0.0)
     assert one.log_odds(down, 0.1) != 0, 'while it is not known how tall he is'
-    one.gallery.learn_height(1.6, 0.0)
+    one.gallery.stature.learn(Height(1.6, 2.0, 0.0))
     assert one.log_odds(view, 0.1) > 2
     assert one.log_odds(down, 0.1) == 0
     assert [one.lies(top, 0.1) for top in (None, 1.2, 0.9, 0.8)] == [False, False, False, True]

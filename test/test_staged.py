@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import cv2
@@ -112,6 +113,23 @@ def one_who_comes_back_after_ten_others(stage: Stage, z: float) -> list[Actor]:
     way = [(0, -0.5, z), (2.5, -0.5, z), (4.5, -edge, z), (29, -edge, z), (31, 0.2, z)]
     ways = [[(3 + 2.5 * k, edge, near), (7 + 2.5 * k, -edge, near)] for k in range(10)]
     return [stage.walk(stage.person(), each) for each in (way, *ways)]
+
+
+def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
+    """He comes where the target has left, 13 cm taller or shorter at least; then he does."""
+    side, out = stage.sign(), 3.0
+    tall, short = stage.uniform(1.78, 1.9), stage.uniform(1.55, 1.65)
+    heights = (tall, short) if stage.rng.uniform() < 0.5 else (short, tall)
+    clothes = stage.person()
+    away, back = side * out, [(13, side * out, z), (16, 0, z), (18, 0, z)]
+    ways = (
+        [(0, -0.7, z), (1.5, 0.6, z), (3, -0.6, z), (5.5, away, z), *back],
+        [(0, away, z), (6, away, z), (8.5, -0.4, z), (9.5, -0.4, z), (12, away, z)],
+    )
+    return [
+        stage.walk(dataclasses.replace(clothes, height=height), way)
+        for height, way in zip(heights, ways, strict=True)
+    ]
 
 
 def _board(stage: Stage, z: float, high: float) -> Actor:
@@ -248,3 +266,21 @@ def test_a_neighbour_that_is_not_seen_for_a_second_is_forgotten():
             assert neighbours.find([], target, 0.2) == []
         neighbours.predict(0.2, None)
         assert neighbours.find([at(0.8, 3.0)], target, 0.2) == ([] if times == 5 else [0])
+
+
+@pytest.mark.parametrize('seed', [1, 3, 6, 8])
+def test_who_wears_the_same_but_is_not_as_tall_is_not_the_target(seed: int):
+    target = TargetSet('metric')
+    number, mistaken, has = 0, 0, list[bool]()
+    for sample in staged(other_in_the_same_clothes, seed, 18):
+        own, other = (sample.truths[n].visible for n in (1, 2))
+        if not number:
+            assert own is not None
+            number = target.add(sample.frame, own)
+            continue
+        box = target.update(sample.frame)[number].box
+        if own is not None and sample.truths[1].visible_fraction > 0.8:
+            has.append(box is not None and box.iou(own) > 0.5)
+        mistaken += box is not None and other is not None and box.iou(other) > 0.5
+    assert mistaken <= RATE_HZ  # until he has walked some steps
+    assert np.mean(has) > 0.85

@@ -246,7 +246,7 @@ class Follower:
         above = (seen.top - box.y / view.step) * seen.depth / view.intrinsics.fy
         # Hair that gives no reading is missing from every view alike.
         cut = seen.cut.top or seen.cut.left or seen.cut.right
-        hidden = cut and person.gallery.top is None
+        hidden = cut and person.gallery.stature.top is None
         if hidden and len(person.gallery.views) == 1 and HIDDEN[0] < above < HIDDEN[1]:
             known = View.of(view, account.scene.codes, seen, None, above)
             person.gallery = Gallery.of(account.described(known, box), account.time)

@@ -204,10 +204,11 @@ class Account:
             if sight.figure.seen.same(seen):
                 return sight.view
         view = look_of(self.scene, seen)
-        index = -1 if self.describer is None else self.sight_of(seen)
-        if index >= 0 and not self.sights[index].figure.parted:  # a part of whom it describes
-            return replace(view, described=self.sights[index].view.described)
-        return view
+        index = self.sight_of(seen)
+        if index < 0 or self.sights[index].figure.parted:
+            return view
+        whole = self.sights[index].view  # a part of whom it describes, and who walks there
+        return replace(view, described=whole.described, walks=whole.walks)
 
     def described(self, view: View, box: Box) -> View:
         """A view with what a network says of its box, if there is one and it has not yet."""

@@ -77,7 +77,8 @@ def log_odds(
             odds[row] += np.minimum(looks[row], OF_TWO + gone)
         else:
             odds[row] += looks[row] - (against + SAME_AGAIN) * gone
-        if low.any() and time - person.seen_at > RECENT and (person.gallery.top or 0.0) > GROWN:
+        grown = (person.gallery.stature.top or 0.0) > GROWN
+        if grown and low.any() and time - person.seen_at > RECENT:
             odds[row, low] = NEW - 1  # nor does he come back as a desk
     ends = np.cumsum([len(p.gallery.views) for p in people])
     return odds, looks, np.split(alike, ends[:-1])

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Collection
 from functools import lru_cache
@@ -68,6 +69,8 @@ mixed as it is, if no view of him alone has taken its place: better than nothing
 MOST_PEOPLE = 48
 """People who are remembered beside the chosen ones; who was seen longest ago is forgotten. It
 bounds time and memory, and is more than come by in most rooms."""
+STEP = 0.4
+"""Metres from where somebody who walks is expected within which a sight may be his: a step."""
 SETTLED = 3
 """Frames after which the room is known: as many as tell that a pixel has no reading
 (:data:`~.perceive.room.BLIND_FRAMES`), so that before it anything may seem to be new."""
@@ -251,6 +254,7 @@ class Crowd:
         expected = np.array([p.expected(time) for p in recent]).reshape(-1, 2)
         figures = find_figures(scene, expected, sum(p.chosen for p in recent))
         sights = self._sights(scene, figures, time)
+        sights = [_in_step(sight, recent, expected, time) for sight in sights]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
@@ -323,7 +327,7 @@ class Crowd:
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
         newcomer = account.people[row]
-        shows = account.sights[column].view.shows ** 2
+        view = account.sights[column].view
         for other, person in enumerate(account.people[: len(account.looks)]):
             if other == row or person.number in newcomer.met:
                 continue
@@ -333,7 +337,7 @@ class Crowd:
                 missed = person.seen_at < newcomer.first_seen
             if missed:
                 look = float(account.looks[other, column])
-                newcomer.resembled(person.number, look, shows, account.time)
+                newcomer.resembled(person, look, view, account.time)
         if not newcomer.chosen:
             new = {p.number: is_new(p.again, account.against) for p in account.people}
             newcomer.again = newcomer.seen_before(new)
@@ -365,6 +369,7 @@ class Crowd:
                 # The number under which it was known while it was not recognised.
                 double = account.stranger(person, index)
                 if double in self.people:
+                    person.gallery.stature.take(double.gallery.stature)
                     self.forget(double)
                 account.owner[index] = row
             self._see(account, row, seen, index, person.number not in unsure)
@@ -438,7 +443,7 @@ class Crowd:
     def disown(self, person: Person, comeback: Comeback) -> None:
         """Who was taken for somebody since a return gets a number of his own."""
         other = self.welcome(person.place, comeback.since)
-        person.exchange(other, comeback.since)
+        person.exchange(other, comeback.left)  # his heights are from before he was recognised
         person.gallery = comeback.known
         person.seen_at, person.misses, person.figure = comeback.left, MISSES, True
         for each in self.unmeet(person, comeback):
@@ -474,6 +479,18 @@ class Crowd:
                 self._comebacks.add(person, person.came, account.against)
         trust = self._comebacks.trust(person)
         learn_sighting(account, row, seen, index, sure, trust)
+
+
+def _in_step(sight: Sight, people: list[Person], expected: FloatArray, time: float) -> Sight:
+    """A sight, and how tall who is there has walked of late; they are ``expected`` ``(n, 2)``."""
+    if not people:
+        return sight
+    off = np.hypot(*(expected - sight.figure.place).T)
+    nearest = int(off.argmin())
+    walks = people[nearest].gallery.stature.of_late(time) if off[nearest] < STEP else None
+    if walks is None:
+        return sight
+    return dataclasses.replace(sight, view=dataclasses.replace(sight.view, walks=walks))
 
 
 def _followed(

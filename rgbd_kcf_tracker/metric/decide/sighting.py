@@ -12,6 +12,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Gallery
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
+from rgbd_kcf_tracker.metric.identity.stature import Height
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -99,8 +100,9 @@ def learn_sighting(
     whole = seen.area > WHOLE and headed and alone and apart and stands
     if whole and person.gallery.mixed:
         person.gallery = Gallery()
-    if view.top is not None and view.top > 1.2:
-        person.gallery.learn_height(view.top, account.time)
+    if view.top is not None:
+        height = Height(view.top, view.distance, account.time)
+        person.gallery.stature.learn(height, person.walks and alone)
     if whole or not person.gallery.views:
         described = account.described(view, box_about(scene, seen))
         person.gallery.learn(described, account.time, trust)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from rgbd_kcf_tracker.metric.identity.gallery import View
 from rgbd_kcf_tracker.metric.identity.person import Person
-from rgbd_kcf_tracker.metric.identity.tally import Tally, logit
+from rgbd_kcf_tracker.metric.identity.tally import Heard, logit
 
 BORNE_OUT = 2.0
 """Log-odds (seven to one) from which whoever was beside him since the return is not the target, as
@@ -42,9 +42,9 @@ class Likely:
     """How likely who came back is the target, 0 to 1.
 
     Attributes:
-        looks: by his looks, beside all in view.
+        looks: by his looks, beside all in view and all others who are known.
         rival: how likely another in view is the target, the likeliest of whom enough was seen.
-        score: beside all others who are known, and anybody new, as well.
+        score: beside anybody new as well.
     """
 
     looks: float
@@ -77,7 +77,7 @@ class Comeback:
         self.likely: Likely | None = None
         self.trust = math.inf
         self._new, self._place = math.exp(against), place
-        self._mine, self._others = Tally(), dict[int, Tally]()
+        self._mine, self._others = Heard(), dict[int, Heard]()
 
     def hear(
         self,
@@ -102,21 +102,21 @@ class Comeback:
         if view is not None:
             self._look(self._mine, view, time)
         for number in others:
-            self._others.setdefault(number, Tally())
+            self._others.setdefault(number, Heard())
         if others:
             number = min(others, key=lambda each: self._others[each].last)
             self._look(self._others[number], others[number], time)
         mine = math.exp(self.odds)
         either, rival = mine, 0.0  # each may be the target, or none of them
         for number in others:
-            tally = self._others[number]
-            odds = tally.mean or 0.0
+            heard = self._others[number]
+            odds = heard.mean or 0.0
             if odds > 0:
                 either += math.exp(odds)
-                if tally.enough and number not in followed:
+                if heard.enough and number not in followed:
                     rival = max(rival, math.exp(odds))
         self.likely = Likely(
-            looks=mine / (1.0 + either),
+            looks=mine / (1.0 + known + either),
             rival=rival / (1.0 + either),
             score=mine / (self._new + known + either),
         )
@@ -128,9 +128,9 @@ class Comeback:
             self.trust = logit(self.likely.score)
             person.gallery.doubt(self.since, self.trust)
 
-    def _look(self, tally: Tally, view: View, time: float) -> None:
-        if time - tally.last >= AGAIN and self.known.stands(view.top, view.leans):
-            tally.add(self.known.log_odds(view), view.shows**2, time)
+    def _look(self, heard: Heard, view: View, time: float) -> None:
+        if time - heard.last >= AGAIN and self.known.stands(view.top, view.leans):
+            self.known.hear(heard, self.known.log_odds(view), view, view.shows**2, time)
 
     @property
     def enough(self) -> bool:

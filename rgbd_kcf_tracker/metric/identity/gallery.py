@@ -17,13 +17,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from statistics import median
 
 import cv2
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.metric.identity.embedding import Described
+from rgbd_kcf_tracker.metric.identity.stature import SEATED, Stature, height_log_odds
+from rgbd_kcf_tracker.metric.identity.tally import Heard
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -72,20 +73,6 @@ WHOLE_AREA, TELLING_AREA, PART = 0.3, 0.1, 0.4
 of him as well as by all (docs/figures.md): a head and shoulders; and the share of that which the
 least part says. Against somebody only all of him says all: what is seen past something has some of
 its colours, and slices that are counted from there."""
-HEIGHT_SIGMA = 0.07
-"""Metres by which the height of one person's head differs between two sightings: gait, hair, and a
-floor that is a little out of true."""
-ANY_HEIGHT = 2.8
-"""Share of all people's heads in each metre of height, where somebody's is: of heights with a
-standard deviation of 10 cm, as of adults, the mean over them, ``1 / (2 * sqrt(pi) * 0.1)``."""
-STOOPED = 0.7
-"""Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
-1 Hz heights of real people hardly tell who it is at all (docs/figures.md)."""
-SEATED, LOWER = 0.55, 0.05
-"""Share of somebody's height from which that is so: on a chair one is three quarters as high as
-when standing, on one's knees or bent over somewhat less (at 0.62 who was half hidden was refused);
-and the share of sightings with the head lower than that."""
-
 _FROM_GREY = np.hypot(*np.meshgrid(*[np.arange(TINTS) - TINTS // 2] * 2, indexing='ij'))
 _COLOR_WEIGHT = np.sqrt(1 + COLORFUL * _FROM_GREY).astype(np.float32)
 _SLICE_WEIGHT = np.array([HEAD_WEIGHT] + [1.0] * (SLICES - 1), np.float32)
@@ -105,6 +92,8 @@ class View:
         described: how a network describes it; None where there is none, or it was not asked.
         leans: whether the head is out of sight to the side, and what shows ends below where it is
             when somebody stands: whose height is known leans or falls out of the image.
+        distance: metres at which it was seen.
+        walks: metres, how tall who is there has walked of late; None where nobody has.
     """
 
     roots: Floats
@@ -114,6 +103,8 @@ class View:
     grey: bool = False
     described: Described | None = None
     leans: bool = False
+    distance: float = 0.0
+    walks: float | None = None
 
     @classmethod
     def of(
@@ -160,6 +151,7 @@ class View:
             top,
             codes.grey,
             leans=leans,
+            distance=float(seen.depth),
         )
 
     @cached_property
@@ -366,19 +358,6 @@ def look_log_odds(
     return min(max(odds, least), most) * (PART + (1 - PART) * told)
 
 
-def height_log_odds(top: float | None, known: float | None) -> float:
-    """Log-odds that a head's height above the floor is the person's rather than anybody's."""
-    if top is None or known is None:
-        return 0.0
-    stooped = STOOPED if top > SEATED * known else LOWER
-    same = (1 - STOOPED) * _normal(top - known, HEIGHT_SIGMA) / ANY_HEIGHT + stooped
-    return math.log(same)
-
-
-def _normal(x: float, sigma: float) -> float:
-    return math.exp(-0.5 * (x / sigma) ** 2) / (sigma * math.sqrt(2 * math.pi))
-
-
 def same_person(first: View, second: View) -> float:
     """Probability that two sightings show the same person, 0 to 1; 0.5 where they say nothing."""
     look = Gallery.of(second, 0.0).log_odds(first)
@@ -394,8 +373,6 @@ everyone's IDF1 was 3 points lower; with all taken it was the same (docs/experim
 SURER = 0.5
 """Log-odds by which a new view is surer than one that it adds nothing to, from which it takes its
 place: with less it would in every frame of a return that is borne out little by little."""
-HEIGHT_MEMORY = 25
-"""Heights of one person that are remembered: some seconds, so that a stoop does not stay."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -425,7 +402,7 @@ class Gallery:
     Attributes:
         views: the first and the newest.
         looks: the same stacked, None while there is none.
-        top: median height of the head above the floor in metres, None where it is not known.
+        stature: the heights of the head.
         mixed: whether the only view is of a piece cut out of two who touched, so that it shows
             something of either: it speaks against nobody until a view of one alone takes its place.
     """
@@ -434,9 +411,8 @@ class Gallery:
         self.mixed = False
         self.views: list[View] = []
         self.looks: Looks | None = None
-        self.top: float | None = None
+        self.stature = Stature()
         self._learned: list[_Learned] = []
-        self._tops: list[tuple[float, float]] = []
         self._largest = 0.0
 
     @property
@@ -450,9 +426,9 @@ class Gallery:
         In who lies, or leans out of the image (:attr:`View.leans`), nothing is where it is in who
         stands: no view of him can be compared.
         """
-        if self.top is None:
+        if self.stature.top is None:
             return True
-        return not leans and (top is None or top > SEATED * self.top)
+        return not leans and (top is None or top > SEATED * self.stature.top)
 
     def log_odds(self, view: View, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view is of the same person; 0 while the gallery is empty.
@@ -469,10 +445,20 @@ class Gallery:
         ``alike`` is the view's :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
         """
         old = alike[np.array([each.time for each in self._learned]) < time]
-        return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old)) if len(old) else None
+        if not len(old):
+            return None
+        return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old), time)
 
-    def _log_odds(self, view: View, alike: Sequence[float] | None, views: int) -> float:
-        odds = height_log_odds(view.top, self.top)
+    def hear(self, heard: Heard, odds: float, view: View, weight: float, time: float) -> None:
+        """Tell of a view that is of the same person by ``odds``, and what of that is its height."""
+        height = self.stature.log_odds(view.top, view.distance, view.walks)
+        tall = self.stature.as_tall(view.top, view.distance, view.walks)
+        heard.hear(odds, weight, time, height=height, told=tall is not None)
+
+    def _log_odds(
+        self, view: View, alike: Sequence[float] | None, views: int, before: float = math.inf
+    ) -> float:
+        odds = self.stature.log_odds(view.top, view.distance, view.walks, before)
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self._largest)
@@ -485,10 +471,6 @@ class Gallery:
         gallery = cls()
         gallery.learn(view, time)
         return gallery
-
-    def learn_height(self, top: float, time: float) -> None:
-        """Take a height of the head above the floor, in metres, seen at ``time`` in seconds."""
-        self._set_tops([*self._tops, (time, top)])
 
     def learn(self, view: View, time: float, trust: float = math.inf) -> None:
         """Take a view of this person, where it shows something new, more of it, or more surely.
@@ -534,25 +516,24 @@ class Gallery:
         """Take all that another gallery has, which has turned out to be of the same person."""
         for each in other._learned:
             self._learn(each)
-        self._set_tops(sorted(self._tops + other._tops))
+        self.stature.take(other.stature)
 
     def copy(self) -> Gallery:
         """The same views and heights; what either learns from now on is its own."""
         same = Gallery()
         same.mixed = self.mixed
         same._set_learned(list(self._learned))
-        same._set_tops(list(self._tops))
+        same.stature = self.stature.copy()
         return same
 
     def taken_back(self, since: float) -> Gallery:
         """Take back what was learned from ``since`` on, in seconds: it was of somebody else."""
         late = Gallery()
         late._set_learned([_Learned(e.view, e.time) for e in self._learned if e.time >= since])
-        late._set_tops([each for each in self._tops if each[0] >= since])
         # What has taken another's place gives it back.
         before = (each if each.time < since else each.before for each in self._learned)
         self._set_learned([each for each in before if each is not None and each.time < since])
-        self._set_tops([each for each in self._tops if each[0] < since])
+        late.stature = self.stature.taken_back(since)
         return late
 
     def _set_learned(self, learned: list[_Learned]) -> None:
@@ -560,10 +541,6 @@ class Gallery:
         trust = [each.trust for each in learned]
         self.looks = Looks.of(self.views, trust) if learned else None
         self._largest = max((view.total for view in self.views), default=0.0)
-
-    def _set_tops(self, tops: list[tuple[float, float]]) -> None:
-        self._tops = tops[-HEIGHT_MEMORY:]
-        self.top = float(median(top for _, top in self._tops)) if self._tops else None
 
     def _most_redundant(self) -> int:
         """Of those least trusted the one most alike another, the older of two.

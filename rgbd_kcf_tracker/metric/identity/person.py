@@ -13,7 +13,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
-from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Tally
+from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Heard, Tally
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
@@ -24,6 +24,8 @@ WALKING = 0.8
 """Metres a second by which a person's next place is unknown: about half of a walk (1.4 m/s), as who
 walks may stop, and who stands may go. Chosen with the real people at 1 Hz among others
 (docs/experiments.md)."""
+WALKS = 0.4
+"""Metres a second from which a person walks: more than those who stand seem to move."""
 STEADY = 0.7
 """Share of that for one who has been followed for some frames and was just seen."""
 COAST = 1.2
@@ -116,7 +118,7 @@ class Person:
         self.calm: Calm | None = None
         self.area, self.again = 0.0, -math.inf
         self.joined = Tally()
-        self._resembles: dict[int, Tally] = {}
+        self._resembles: dict[int, Heard] = {}
         self.gallery = Gallery()
 
     @property
@@ -128,6 +130,11 @@ class Person:
         joined = self.joined.mean if self.joined.enough else None
         apart = joined is None or joined <= JOINED
         return (self.upright or self.travelled > TRAVELLED) and apart
+
+    @property
+    def walks(self) -> bool:
+        """Whether it was walking when it was last seen."""
+        return self.sightings > 2 and float(np.hypot(*self.velocity)) >= WALKS
 
     def log_odds(self, view: View, time: float, alike: Sequence[float] | None = None) -> float:
         """Log-odds that a view at ``time`` is of this person, see :meth:`Gallery.log_odds`."""
@@ -206,12 +213,13 @@ class Person:
         self.met.add(other.number)
         other.met.add(self.number)
 
-    def resembled(self, other: int, odds: float, weight: float, time: float) -> None:
-        """Take log-odds of a sighting of this one to look like another, who is not in view.
+    def resembled(self, other: Person, odds: float, view: View, time: float) -> None:
+        """Take log-odds of a view of this one, at ``time`` in seconds, to be of another.
 
-        ``other`` is the number of that one; the rest is as for :meth:`Tally.add`.
+        The ``other`` is not in view.
         """
-        self._resembles.setdefault(other, Tally()).add(odds, weight, time)
+        heard = self._resembles.setdefault(other.number, Heard())
+        other.gallery.hear(heard, odds, view, view.shows**2, time)
 
     def resemblance(self, other: int) -> float | None:
         """Mean log-odds of looking like another, in the sightings of late; None for none."""

@@ -78,6 +78,41 @@ class Tally:
         Sightings of one walk say little more than one of them: that two people wear the same does
         not change from frame to frame.
         """
-        if self._count == 0 or self._count < enough:
+        mean = self.mean
+        if mean is None or self._count < enough:
             return 0.0
-        return self._total / self._count * (1 + AGAIN * math.log2(max(self._count, 1.0)))
+        return mean * (1 + AGAIN * math.log2(max(self._count, 1.0)))
+
+
+class Heard(Tally):
+    """What sightings say of being somebody who is known, by the look and the height.
+
+    How tall somebody is shows after some steps, and was true of him before: what heights said until
+    then is forgotten, and only those that tell it count from then on.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._heights, self._told = Tally(), False
+
+    def hear(self, odds: float, weight: float, time: float, *, height: float, told: bool) -> None:
+        """Take a sighting.
+
+        Args:
+            odds: log-odds by the look and the height.
+            weight: how much showed, see :meth:`Tally.add`.
+            time: seconds.
+            height: what of them is by the height.
+            told: whether that tells how tall he is.
+        """
+        self.add(odds - height, weight, time)
+        if told and not self._told:
+            self._heights, self._told = Tally(), True
+        if told or not self._told:
+            self._heights.add(height, weight, time)
+
+    @property
+    def mean(self) -> float | None:
+        """Mean log-odds of the looks and the heights; None where nothing was seen."""
+        mean = super().mean
+        return None if mean is None else mean + (self._heights.mean or 0.0)

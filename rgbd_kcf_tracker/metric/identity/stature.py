@@ -1,0 +1,187 @@
+# Copyright 2026 The rgbd_kcf_tracker authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""How tall somebody is, by the height of the head above the floor.
+
+Heights at large tell of stooping and sitting more than of who it is. Who walks stands upright: of
+real people nine tenths of these heights lie within 4 cm of each other (docs/figures.md), and nobody
+is taller than he walks.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect
+from operator import attrgetter
+from statistics import median
+from typing import NamedTuple
+
+SIGMA = 0.07
+"""Metres by which the height of one person's head differs between two sightings: gait, hair, and a
+floor that is a little out of true."""
+SPREAD = 0.1 * math.sqrt(2)
+"""Metres by which the heights of two people differ, as adults' have a standard deviation of 10 cm.
+"""
+ANY = 1 / (math.sqrt(2 * math.pi) * SPREAD)
+"""Share of all people's heads in each metre of height, where somebody's is: a mean over them."""
+STOOPED = 0.7
+"""Share of sightings whose height says nothing: who stoops or sits, a head that is half hidden. At
+1 Hz heights of real people hardly tell who it is at all (docs/figures.md)."""
+SEATED, LOWER = 0.55, 0.05
+"""Share of somebody's height from which that is so: on a chair one is three quarters as high as
+when standing, on one's knees or bent over somewhat less (at 0.62 who was half hidden was refused);
+and the share of sightings with the head lower than that."""
+STEP, SLOPE = 0.03, 0.08
+"""Metres by which two heights of one who walks differ, from step to step, and for each metre
+between the distances at which they were seen: a floor of which little shows is out of true."""
+NEAREST, OF_LATE = 7, 1.0
+"""Heights, seen at about the same distance, that one is held against, and seconds of whose heights
+it is told how tall somebody walks now: those are of a step or two, and most of them are right."""
+RARELY = 0.01
+"""Share of those who came back who are not as tall as they were: a hat, a load, another floor. As
+long as little is known it is more, half a height of as many as are known."""
+LOWEST = 1.2
+"""Metres from which a height is remembered of one who does not walk: lower ones are of who crawls
+or bends down, or of an arm."""
+TOLD, AGAIN = 3, 0.08
+"""Heights of somebody who walks from which it is known how tall he is, and seconds from one of them
+to the next: sooner it is the same step, and ten a second are as many as are learned."""
+NEWEST, WALKED = 25, 40
+"""Heights that are remembered: the newest, some seconds, so that a stoop does not stay; and of
+those who walk the first and the newest, so that a mistake of some seconds does not replace all."""
+
+
+class Height(NamedTuple):
+    """A head's height above the floor and the distance at which it was seen, in metres.
+
+    ``time`` is when, in seconds.
+    """
+
+    top: float
+    distance: float
+    time: float
+
+
+class Stature:
+    """The heights by which one is known.
+
+    Attributes:
+        top: median of the newest in metres, None where none is known.
+    """
+
+    def __init__(self) -> None:
+        self.top: float | None = None
+        self._newest: list[Height] = []
+        self._walked: list[Height] = []
+        self._by_distance: list[Height] = []
+
+    def learn(self, height: Height, walks: bool = False) -> None:
+        """Take a height, of one who walks or not."""
+        walked = self._walked
+        if walks and not (walked and height.time - walked[-1].time < AGAIN):
+            walked = [*walked, height]
+        newest = [*self._newest, height] if height.top > LOWEST else self._newest
+        self._set(newest, walked)
+
+    def of_late(self, time: float) -> float | None:
+        """How tall somebody has walked in the last second before ``time``; None if not enough."""
+        late = [each.top for each in self._walked if time - each.time < OF_LATE]
+        return _upright(late) if len(late) >= TOLD else None
+
+    def log_odds(
+        self,
+        top: float | None,
+        distance: float,
+        walks: float | None = None,
+        before: float = math.inf,
+    ) -> float:
+        """Log-odds that a head's height is the person's rather than anybody's.
+
+        A height that fits says little, as most people are about as tall.
+
+        Args:
+            top: metres above the floor, None where it is not known.
+            distance: metres at which it was seen.
+            walks: metres, how tall who is there has walked of late, see :meth:`of_late`.
+            before: how tall somebody walks is told by what was learned before, in seconds.
+        """
+        odds = height_log_odds(top, self.top)
+        tall = self.as_tall(top, distance, walks, before)
+        return odds if tall is None else min(tall, odds)
+
+    def as_tall(
+        self,
+        top: float | None,
+        distance: float,
+        walks: float | None = None,
+        before: float = math.inf,
+    ) -> float | None:
+        """Log-odds that somebody is as tall; None where nothing tells.
+
+        Nobody is taller than he walks, and who walks is as tall; others may stoop or sit. See
+        :meth:`log_odds` for the rest.
+        """
+        top = top if walks is None else walks
+        walked = self._by_distance
+        if before < math.inf:
+            walked = [each for each in walked if each.time < before]
+        if top is None or len(walked) < TOLD:
+            return None
+        here = bisect(walked, distance, key=_distance)
+        around = walked[max(here - NEAREST, 0) : here + NEAREST]
+        nearest = sorted(around, key=lambda each: abs(each.distance - distance))[:NEAREST]
+        apart = abs(nearest[len(nearest) // 2].distance - distance)
+        sigma = math.hypot(STEP * math.sqrt(1 + 1 / len(nearest)), SLOPE * apart)
+        off = top - _upright([each.top for each in nearest])
+        if walks is None and off < -2 * sigma:
+            return None
+        same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
+        otherwise = max(RARELY, 0.5 / len(walked))
+        return math.log((1 - otherwise) * same / other + otherwise)
+
+    def take(self, other: Stature) -> None:
+        """Take all that another has, which has turned out to be of the same person."""
+        self._set(
+            sorted(self._newest + other._newest, key=_time),
+            sorted(self._walked + other._walked, key=_time),
+        )
+
+    def taken_back(self, since: float) -> Stature:
+        """Take back what was learned from ``since`` on, in seconds."""
+        late = Stature()
+        late._set(*([h for h in each if h.time >= since] for each in (self._newest, self._walked)))
+        self._set(*([h for h in each if h.time < since] for each in (self._newest, self._walked)))
+        return late
+
+    def copy(self) -> Stature:
+        """The same heights; what either learns from now on is its own."""
+        same = Stature()
+        same._set(self._newest, self._walked)
+        return same
+
+    def _set(self, newest: list[Height], walked: list[Height]) -> None:
+        self._newest = newest[-NEWEST:]
+        more = max(len(walked) - WALKED, 0)
+        self._walked = walked[: WALKED // 2] + walked[WALKED // 2 + more :]
+        self._by_distance = sorted(self._walked, key=_distance)
+        self.top = float(median(h.top for h in self._newest)) if newest else None
+
+
+def height_log_odds(top: float | None, known: float | None) -> float:
+    """Log-odds that a head's height above the floor is the person's rather than anybody's."""
+    if top is None or known is None:
+        return 0.0
+    stooped = STOOPED if top > SEATED * known else LOWER
+    return math.log((1 - STOOPED) * _normal(top - known, SIGMA) / ANY + stooped)
+
+
+def _upright(tops: list[float]) -> float:
+    """How tall who had these heights is: their upper quartile, as a head seldom seems too high."""
+    return sorted(tops)[3 * (len(tops) - 1) // 4]
+
+
+def _normal(x: float, sigma: float) -> float:
+    return math.exp(-0.5 * (x / sigma) ** 2) / (sigma * math.sqrt(2 * math.pi))
+
+
+_time, _distance = attrgetter('time'), attrgetter('distance')
