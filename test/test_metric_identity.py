@@ -80,7 +80,7 @@ from rgbd_kcf_tracker.metric.identity.relief import Relief
 from rgbd_kcf_tracker.metric.identity.stature import (
     NEWEST,
     TOLD,
-    WALKED,
+    UPRIGHT,
     Height,
     Stature,
     height_log_odds,
@@ -325,7 +325,7 @@ def walked(top: float, count: int = 10, distance: float = 3.0, start: float = 0.
     """Of somebody who has walked for so many steps."""
     stature = Stature()
     for n in range(count):
-        stature.learn(Height(top, distance, start + 0.1 * n), walks=True)
+        stature.learn(Height(top, distance, start + 0.1 * n, walks=True))
     return stature
 
 
@@ -351,7 +351,7 @@ def test_how_tall_somebody_walks_is_known_after_some_steps_and_better_after_more
     # Heights within a tenth of a second are of one step.
     quick = Stature()
     for n in range(TOLD * 2):
-        quick.learn(Height(1.7, 3.0, n / 30), walks=True)
+        quick.learn(Height(1.7, 3.0, n / 30, walks=True))
     assert quick.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
     assert quick.of_late(0.2) is None
     assert walked(1.7).of_late(1.0) == 1.7
@@ -372,11 +372,30 @@ def test_a_floor_out_of_true_makes_heights_at_another_distance_say_less():
     assert sloping.log_odds(1.85, 3.0) < -2.5
 
 
+def test_who_is_higher_than_anybody_sits_is_upright_and_a_hidden_head_is_not_asked():
+    standing, sitting = Stature(), Stature()
+    for n in range(20):
+        standing.learn(Height(1.7, 3.0, 0.1 * n))
+        sitting.learn(Height(1.3, 3.0, 0.1 * n))
+    assert standing.log_odds(1.85, 3.0) < -2.5
+    assert standing.of_late(2.0) is None, 'he has not walked'
+    # Who sits may get up.
+    assert sitting.log_odds(1.7, 3.0) == height_log_odds(1.7, 1.3)
+    touching = Stature()
+    for n in range(20):
+        touching.learn(Height(1.7, 3.0, 0.1 * n, walks=True), alone=False)
+    assert touching.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7), 'it may be of another'
+    # Farther off than all others he was half hidden.
+    hidden = walked(1.7)
+    hidden.take(walked(1.4, distance=3.2, start=9.0, count=7))
+    assert hidden.log_odds(1.7, 4.0) > 0
+
+
 def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them():
-    stature = walked(1.7, WALKED * 2)
-    for n in range(WALKED * 2):
-        stature.learn(Height(1.5, 3.0, 100 + 0.1 * n), walks=True)
-    assert len(stature._walked) == WALKED
+    stature = walked(1.7, UPRIGHT * 2)
+    for n in range(UPRIGHT * 2):
+        stature.learn(Height(1.5, 3.0, 100 + 0.1 * n, walks=True))
+    assert len(stature._upright) == UPRIGHT
     assert len(stature._newest) == NEWEST
     assert stature.top == 1.5
     assert stature.log_odds(1.85, 3.0, before=100.0) < -2.5

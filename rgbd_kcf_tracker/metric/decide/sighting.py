@@ -101,8 +101,8 @@ def learn_sighting(
     if whole and person.gallery.mixed:
         person.gallery = Gallery()
     if view.top is not None:
-        height = Height(view.top, view.distance, account.time)
-        person.gallery.stature.learn(height, person.walks and alone)
+        height = Height(view.top, view.distance, account.time, person.walks)
+        person.gallery.stature.learn(height, alone)
     if whole or not person.gallery.views:
         described = account.described(view, box_about(scene, seen))
         person.gallery.learn(described, account.time, trust)

@@ -4,8 +4,8 @@
 """How tall somebody is, by the height of the head above the floor.
 
 Heights at large tell of stooping and sitting more than of who it is. Who walks stands upright: of
-real people nine tenths of these heights lie within 4 cm of each other (docs/figures.md), and nobody
-is taller than he walks.
+real people nine tenths of these heights lie within 4 cm of their median (docs/metric.md). So does
+who is higher than anybody sits. Nobody is taller than that.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SEATED, LOWER = 0.55, 0.05
 """Share of somebody's height from which that is so: on a chair one is three quarters as high as
 when standing, on one's knees or bent over somewhat less (at 0.62 who was half hidden was refused);
 and the share of sightings with the head lower than that."""
-STEP, SLOPE = 0.03, 0.08
+STEP, SLOPE = 0.03, 0.05
 """Metres by which two heights of one who walks differ, from step to step, and for each metre
 between the distances at which they were seen: a floor of which little shows is out of true."""
 NEAREST, OF_LATE = 7, 1.0
@@ -40,26 +40,34 @@ it is told how tall somebody walks now: those are of a step or two, and most of 
 RARELY = 0.01
 """Share of those who came back who are not as tall as they were: a hat, a load, another floor. As
 long as little is known it is more, half a height of as many as are known."""
+STANDS = 1.4
+"""Metres from which a head is of somebody who stands: who sits on a chair is lower."""
 LOWEST = 1.2
 """Metres from which a height is remembered of one who does not walk: lower ones are of who crawls
 or bends down, or of an arm."""
 TOLD, AGAIN = 3, 0.08
-"""Heights of somebody who walks from which it is known how tall he is, and seconds from one of them
+"""Heights of somebody upright from which it is known how tall he is, and seconds from one of them
 to the next: sooner it is the same step, and ten a second are as many as are learned."""
-NEWEST, WALKED = 25, 40
-"""Heights that are remembered: the newest, some seconds, so that a stoop does not stay; and of
-those who walk the first and the newest, so that a mistake of some seconds does not replace all."""
+NEWEST, UPRIGHT = 25, 40
+"""Heights that are remembered: the newest, some seconds, so that a stoop does not stay; and of who
+is upright the first and the newest, so that a mistake of some seconds does not replace all."""
 
 
 class Height(NamedTuple):
     """A head's height above the floor and the distance at which it was seen, in metres.
 
-    ``time`` is when, in seconds.
+    ``time`` is when, in seconds, and ``walks`` whether it is of one who walks.
     """
 
     top: float
     distance: float
     time: float
+    walks: bool = False
+
+    @property
+    def upright(self) -> bool:
+        """Whether it is of one who stands upright, as far as can be told."""
+        return self.walks or self.top > STANDS
 
 
 class Stature:
@@ -72,21 +80,22 @@ class Stature:
     def __init__(self) -> None:
         self.top: float | None = None
         self._newest: list[Height] = []
-        self._walked: list[Height] = []
+        self._upright: list[Height] = []
         self._by_distance: list[Height] = []
 
-    def learn(self, height: Height, walks: bool = False) -> None:
-        """Take a height, of one who walks or not."""
-        walked = self._walked
-        if walks and not (walked and height.time - walked[-1].time < AGAIN):
-            walked = [*walked, height]
+    def learn(self, height: Height, alone: bool = True) -> None:
+        """Take a height; what is not surely of one person ``alone`` tells not how tall he is."""
+        upright = self._upright
+        again = upright and height.time - upright[-1].time < AGAIN
+        if alone and height.upright and not again:
+            upright = [*upright, height]
         newest = [*self._newest, height] if height.top > LOWEST else self._newest
-        self._set(newest, walked)
+        self._set(newest, upright)
 
     def of_late(self, time: float) -> float | None:
         """How tall somebody has walked in the last second before ``time``; None if not enough."""
-        late = [each.top for each in self._walked if time - each.time < OF_LATE]
-        return _upright(late) if len(late) >= TOLD else None
+        late = [h.top for h in self._upright if h.walks and time - h.time < OF_LATE]
+        return _upper(late) if len(late) >= TOLD else None
 
     def log_odds(
         self,
@@ -103,7 +112,7 @@ class Stature:
             top: metres above the floor, None where it is not known.
             distance: metres at which it was seen.
             walks: metres, how tall who is there has walked of late, see :meth:`of_late`.
-            before: how tall somebody walks is told by what was learned before, in seconds.
+            before: how tall he is is told by what was learned before, in seconds.
         """
         odds = height_log_odds(top, self.top)
         tall = self.as_tall(top, distance, walks, before)
@@ -118,52 +127,57 @@ class Stature:
     ) -> float | None:
         """Log-odds that somebody is as tall; None where nothing tells.
 
-        Nobody is taller than he walks, and who walks is as tall; others may stoop or sit. See
+        Nobody is taller than upright, and who walks is as tall; others may stoop or sit. See
         :meth:`log_odds` for the rest.
         """
         top = top if walks is None else walks
-        walked = self._by_distance
+        known = self._by_distance
         if before < math.inf:
-            walked = [each for each in walked if each.time < before]
-        if top is None or len(walked) < TOLD:
+            known = [each for each in known if each.time < before]
+        if top is None or len(known) < TOLD:
             return None
-        here = bisect(walked, distance, key=_distance)
-        around = walked[max(here - NEAREST, 0) : here + NEAREST]
+        here = bisect(known, distance, key=_distance)
+        around = known[max(here - NEAREST, 0) : here + NEAREST]
         nearest = sorted(around, key=lambda each: abs(each.distance - distance))[:NEAREST]
         apart = abs(nearest[len(nearest) // 2].distance - distance)
         sigma = math.hypot(STEP * math.sqrt(1 + 1 / len(nearest)), SLOPE * apart)
-        off = top - _upright([each.top for each in nearest])
+        off = top - _upper([each.top for each in nearest])
         if walks is None and off < -2 * sigma:
             return None
         same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
-        otherwise = max(RARELY, 0.5 / len(walked))
+        otherwise = max(RARELY, 0.5 / len(known))
         return math.log((1 - otherwise) * same / other + otherwise)
 
     def take(self, other: Stature) -> None:
         """Take all that another has, which has turned out to be of the same person."""
         self._set(
             sorted(self._newest + other._newest, key=_time),
-            sorted(self._walked + other._walked, key=_time),
+            sorted(self._upright + other._upright, key=_time),
         )
 
     def taken_back(self, since: float) -> Stature:
         """Take back what was learned from ``since`` on, in seconds."""
         late = Stature()
-        late._set(*([h for h in each if h.time >= since] for each in (self._newest, self._walked)))
-        self._set(*([h for h in each if h.time < since] for each in (self._newest, self._walked)))
+        late._set(*([h for h in each if h.time >= since] for each in (self._newest, self._upright)))
+        self._set(*([h for h in each if h.time < since] for each in (self._newest, self._upright)))
         return late
 
     def copy(self) -> Stature:
         """The same heights; what either learns from now on is its own."""
         same = Stature()
-        same._set(self._newest, self._walked)
+        same._set(self._newest, self._upright)
         return same
 
-    def _set(self, newest: list[Height], walked: list[Height]) -> None:
+    def _set(self, newest: list[Height], upright: list[Height]) -> None:
         self._newest = newest[-NEWEST:]
-        more = max(len(walked) - WALKED, 0)
-        self._walked = walked[: WALKED // 2] + walked[WALKED // 2 + more :]
-        self._by_distance = sorted(self._walked, key=_distance)
+        more = max(len(upright) - UPRIGHT, 0)
+        self._upright = upright[: UPRIGHT // 2] + upright[UPRIGHT // 2 + more :]
+        self._by_distance = sorted(self._upright, key=_distance)
+        if self._upright:
+            # What is lower by as much as two people differ is of who stoops, or of a hidden head.
+            span = self._by_distance[-1].distance - self._by_distance[0].distance
+            least = _upper([h.top for h in self._upright]) - SPREAD - SLOPE * span
+            self._by_distance = [h for h in self._by_distance if h.top > least]
         self.top = float(median(h.top for h in self._newest)) if newest else None
 
 
@@ -175,7 +189,7 @@ def height_log_odds(top: float | None, known: float | None) -> float:
     return math.log((1 - STOOPED) * _normal(top - known, SIGMA) / ANY + stooped)
 
 
-def _upright(tops: list[float]) -> float:
+def _upper(tops: list[float]) -> float:
     """How tall who had these heights is: their upper quartile, as a head seldom seems too high."""
     return sorted(tops)[3 * (len(tops) - 1) // 4]
 
