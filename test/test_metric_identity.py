@@ -78,11 +78,13 @@ from rgbd_kcf_tracker.metric.identity.gallery import (
 from rgbd_kcf_tracker.metric.identity.person import COAST, VELOCITY_TIME, Person
 from rgbd_kcf_tracker.metric.identity.relief import Relief
 from rgbd_kcf_tracker.metric.identity.stature import (
+    LEVEL,
     NEWEST,
     TOLD,
     UPRIGHT,
     Height,
     Stature,
+    Tilt,
     height_log_odds,
 )
 from rgbd_kcf_tracker.metric.identity.stood import (
@@ -389,6 +391,27 @@ def test_who_is_higher_than_anybody_sits_is_upright_and_a_hidden_head_is_not_ask
     hidden = walked(1.7)
     hidden.take(walked(1.4, distance=3.2, start=9.0, count=7))
     assert hidden.log_odds(1.7, 4.0) > 0
+
+
+@pytest.mark.parametrize('slope', [-0.06, 0.0, 0.06])
+def test_who_walks_near_and_far_tells_how_far_the_floor_is_out_of_true(slope: float):
+    rng = np.random.default_rng(1)
+    people = [Stature() for _ in range(3)]
+    assert Tilt.told_by(people) == Tilt.told_by([]) == LEVEL
+    for height, stature in zip((1.6, 1.7, 1.8), people, strict=True):
+        for n, distance in enumerate(np.linspace(2.0, 5.0, 40)):
+            top = height + slope * distance + rng.normal(0, 0.02)
+            stature.learn(Height(top, float(distance), 0.1 * n, walks=True))
+    tilt = Tilt.told_by(people)
+    assert tilt.slope == pytest.approx(slope, abs=0.01)
+    assert tilt.sigma < LEVEL.sigma / 4
+    # Where the floor is known, heights at another distance say as much as at the same.
+    near = walked(1.7, 20, distance=2.0)
+    far = 1.7 + 3 * slope
+    same = near.as_tall(far, 5.0, tilt=tilt)
+    assert same is not None
+    assert same > 1
+    assert near.log_odds(far + 0.15, 5.0, tilt=tilt) < -2 < near.log_odds(1.85, 5.0)
 
 
 def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them():

@@ -34,10 +34,12 @@ from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
+from rgbd_kcf_tracker.metric.identity.stature import LEVEL, Tilt
 from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
+from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP
@@ -254,7 +256,10 @@ class Crowd:
         expected = np.array([p.expected(time) for p in recent]).reshape(-1, 2)
         figures = find_figures(scene, expected, sum(p.chosen for p in recent))
         sights = self._sights(scene, figures, time)
-        sights = [_in_step(sight, recent, expected, time) for sight in sights]
+        # Before a camera that moves the floor is another one in each frame.
+        still = scene.stood_for >= SETTLE
+        tilt = Tilt.told_by(p.gallery.stature for p in self.people) if still else LEVEL
+        sights = [_in_step(sight, recent, expected, time, tilt) for sight in sights]
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
@@ -481,16 +486,18 @@ class Crowd:
         learn_sighting(account, row, seen, index, sure, trust)
 
 
-def _in_step(sight: Sight, people: list[Person], expected: FloatArray, time: float) -> Sight:
+def _in_step(
+    sight: Sight, people: list[Person], expected: FloatArray, time: float, tilt: Tilt
+) -> Sight:
     """A sight, and how tall who is there has walked of late; they are ``expected`` ``(n, 2)``."""
-    if not people:
-        return sight
-    off = np.hypot(*(expected - sight.figure.place).T)
-    nearest = int(off.argmin())
-    walks = people[nearest].gallery.stature.of_late(time) if off[nearest] < STEP else None
-    if walks is None:
-        return sight
-    return dataclasses.replace(sight, view=dataclasses.replace(sight.view, walks=walks))
+    walks = None
+    if people:
+        off = np.hypot(*(expected - sight.figure.place).T)
+        nearest = int(off.argmin())
+        if off[nearest] < STEP:
+            walks = people[nearest].gallery.stature.of_late(time)
+    view = dataclasses.replace(sight.view, walks=walks, tilt=tilt)
+    return dataclasses.replace(sight, view=view)
 
 
 def _followed(

@@ -23,7 +23,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.metric.identity.embedding import Described
-from rgbd_kcf_tracker.metric.identity.stature import SEATED, Stature, height_log_odds
+from rgbd_kcf_tracker.metric.identity.stature import LEVEL, SEATED, Stature, Tilt, height_log_odds
 from rgbd_kcf_tracker.metric.identity.tally import Heard
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -94,6 +94,7 @@ class View:
             when somebody stands: whose height is known leans or falls out of the image.
         distance: metres at which it was seen.
         walks: metres, how tall who is there has walked of late; None where nobody has.
+        tilt: of the floor above which the top is.
     """
 
     roots: Floats
@@ -105,6 +106,7 @@ class View:
     leans: bool = False
     distance: float = 0.0
     walks: float | None = None
+    tilt: Tilt = LEVEL
 
     @classmethod
     def of(
@@ -451,14 +453,14 @@ class Gallery:
 
     def hear(self, heard: Heard, odds: float, view: View, weight: float, time: float) -> None:
         """Tell of a view that is of the same person by ``odds``, and what of that is its height."""
-        height = self.stature.log_odds(view.top, view.distance, view.walks)
-        tall = self.stature.as_tall(view.top, view.distance, view.walks)
+        seen = view.top, view.distance, view.walks, math.inf, view.tilt
+        height, tall = self.stature.log_odds(*seen), self.stature.as_tall(*seen)
         heard.hear(odds, weight, time, height=height, told=tall is not None)
 
     def _log_odds(
         self, view: View, alike: Sequence[float] | None, views: int, before: float = math.inf
     ) -> float:
-        odds = self.stature.log_odds(view.top, view.distance, view.walks, before)
+        odds = self.stature.log_odds(view.top, view.distance, view.walks, before, view.tilt)
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self._largest)

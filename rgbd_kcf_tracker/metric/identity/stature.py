@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect
+from collections.abc import Iterable
 from operator import attrgetter
-from statistics import median
+from statistics import fmean, median
 from typing import NamedTuple
 
 SIGMA = 0.07
@@ -33,7 +34,9 @@ when standing, on one's knees or bent over somewhat less (at 0.62 who was half h
 and the share of sightings with the head lower than that."""
 STEP, SLOPE = 0.03, 0.05
 """Metres by which two heights of one who walks differ, from step to step, and for each metre
-between the distances at which they were seen: a floor of which little shows is out of true."""
+between the distances at which they were seen, as a floor of which little shows is out of true."""
+A_STEP = 5
+"""Heights of one step, which are no surer than one: ten a second of two steps a second."""
 NEAREST, OF_LATE = 7, 1.0
 """Heights, seen at about the same distance, that one is held against, and seconds of whose heights
 it is told how tall somebody walks now: those are of a step or two, and most of them are right."""
@@ -70,15 +73,41 @@ class Height(NamedTuple):
         return self.walks or self.top > STANDS
 
 
+class Tilt(NamedTuple):
+    """How far the floor is out of true: metres that heights grow by with each metre of distance.
+
+    ``sigma`` is the standard deviation of ``slope``.
+    """
+
+    slope: float = 0.0
+    sigma: float = SLOPE
+
+    @classmethod
+    def told_by(cls, everybody: Iterable[Stature]) -> Tilt:
+        """As those tell who were seen near and far, each as tall here as there."""
+        squared = along = 0.0
+        for each in everybody:
+            squared, along = squared + each.spread[0], along + each.spread[1]
+        known = (STEP / SLOPE) ** 2 + squared / A_STEP
+        return cls(along / A_STEP / known, STEP / math.sqrt(known))
+
+
+LEVEL = Tilt()
+"""Of a floor of which nobody has told."""
+
+
 class Stature:
     """The heights by which one is known.
 
     Attributes:
         top: median of the newest in metres, None where none is known.
+        spread: sums over the heights of one upright of the squared deviation of their distance from
+            its mean, and of that times theirs.
     """
 
     def __init__(self) -> None:
         self.top: float | None = None
+        self.spread = 0.0, 0.0
         self._newest: list[Height] = []
         self._upright: list[Height] = []
         self._by_distance: list[Height] = []
@@ -103,6 +132,7 @@ class Stature:
         distance: float,
         walks: float | None = None,
         before: float = math.inf,
+        tilt: Tilt = LEVEL,
     ) -> float:
         """Log-odds that a head's height is the person's rather than anybody's.
 
@@ -113,9 +143,10 @@ class Stature:
             distance: metres at which it was seen.
             walks: metres, how tall who is there has walked of late, see :meth:`of_late`.
             before: how tall he is is told by what was learned before, in seconds.
+            tilt: of the floor.
         """
         odds = height_log_odds(top, self.top)
-        tall = self.as_tall(top, distance, walks, before)
+        tall = self.as_tall(top, distance, walks, before, tilt)
         return odds if tall is None else min(tall, odds)
 
     def as_tall(
@@ -124,6 +155,7 @@ class Stature:
         distance: float,
         walks: float | None = None,
         before: float = math.inf,
+        tilt: Tilt = LEVEL,
     ) -> float | None:
         """Log-odds that somebody is as tall; None where nothing tells.
 
@@ -140,8 +172,9 @@ class Stature:
         around = known[max(here - NEAREST, 0) : here + NEAREST]
         nearest = sorted(around, key=lambda each: abs(each.distance - distance))[:NEAREST]
         apart = abs(nearest[len(nearest) // 2].distance - distance)
-        sigma = math.hypot(STEP * math.sqrt(1 + 1 / len(nearest)), SLOPE * apart)
-        off = top - _upper([each.top for each in nearest])
+        sigma = math.hypot(STEP * math.sqrt(1 + 1 / len(nearest)), tilt.sigma * apart)
+        here_as = [h.top + tilt.slope * (distance - h.distance) for h in nearest]
+        off = top - _upper(here_as)
         if walks is None and off < -2 * sigma:
             return None
         same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
@@ -178,6 +211,13 @@ class Stature:
             span = self._by_distance[-1].distance - self._by_distance[0].distance
             least = _upper([h.top for h in self._upright]) - SPREAD - SLOPE * span
             self._by_distance = [h for h in self._by_distance if h.top > least]
+            mean = fmean(h.distance for h in self._by_distance)
+            self.spread = (
+                sum((h.distance - mean) ** 2 for h in self._by_distance),
+                sum((h.distance - mean) * h.top for h in self._by_distance),
+            )
+        else:
+            self.spread = 0.0, 0.0
         self.top = float(median(h.top for h in self._newest)) if newest else None
 
 
