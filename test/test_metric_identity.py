@@ -355,9 +355,9 @@ def test_how_tall_somebody_walks_is_known_after_some_steps_and_better_after_more
     for n in range(TOLD * 2):
         quick.learn(Height(1.7, 3.0, n / 30, walks=True))
     assert quick.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
-    assert quick.of_late(0.2) is None
-    assert walked(1.7).of_late(1.0) == 1.7
-    assert walked(1.7).of_late(3.0) is None
+    assert quick.walking_top(0.2) is None
+    assert walked(1.7).walking_top(1.0) == 1.7
+    assert walked(1.7).walking_top(3.0) is None
 
 
 def test_a_floor_out_of_true_makes_heights_at_another_distance_say_less():
@@ -380,7 +380,7 @@ def test_who_is_higher_than_anybody_sits_is_upright_and_a_hidden_head_is_not_ask
         standing.learn(Height(1.7, 3.0, 0.1 * n))
         sitting.learn(Height(1.3, 3.0, 0.1 * n))
     assert standing.log_odds(1.85, 3.0) < -2.5
-    assert standing.of_late(2.0) is None, 'he has not walked'
+    assert standing.walking_top(2.0) is None, 'he has not walked'
     # Who sits may get up.
     assert sitting.log_odds(1.7, 3.0) == height_log_odds(1.7, 1.3)
     touching = Stature()
@@ -424,7 +424,11 @@ def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them
     assert stature.log_odds(1.85, 3.0, before=100.0) < -2.5
     late = stature.taken_back(100.0)
     assert (stature.top, late.top) == (None, 1.5)
-    assert stature.log_odds(1.5, 3.0, walks=1.5) < -2.5 < late.log_odds(1.5, 3.0, walks=1.5)
+    assert (
+        stature.log_odds(1.5, 3.0, walking_top=1.5)
+        < -2.5
+        < late.log_odds(1.5, 3.0, walking_top=1.5)
+    )
 
 
 def test_what_one_view_does_not_show_is_as_in_the_others():

@@ -208,7 +208,9 @@ class Account:
         if index < 0 or self.sights[index].figure.parted:
             return view
         whole = self.sights[index].view  # a part of whom it describes, and who walks there
-        return replace(view, described=whole.described, walks=whole.walks, tilt=whole.tilt)
+        return replace(
+            view, described=whole.described, walking_top=whole.walking_top, tilt=whole.tilt
+        )
 
     def described(self, view: View, box: Box) -> View:
         """A view with what a network says of its box, if there is one and it has not yet."""

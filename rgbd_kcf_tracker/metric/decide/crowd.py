@@ -490,13 +490,13 @@ def _in_step(
     sight: Sight, people: list[Person], expected: FloatArray, time: float, tilt: Tilt
 ) -> Sight:
     """A sight, and how tall who is there has walked of late; they are ``expected`` ``(n, 2)``."""
-    walks = None
+    walking_top = None
     if people:
         off = np.hypot(*(expected - sight.figure.place).T)
         nearest = int(off.argmin())
         if off[nearest] < STEP:
-            walks = people[nearest].gallery.stature.of_late(time)
-    view = dataclasses.replace(sight.view, walks=walks, tilt=tilt)
+            walking_top = people[nearest].gallery.stature.walking_top(time)
+    view = dataclasses.replace(sight.view, walking_top=walking_top, tilt=tilt)
     return dataclasses.replace(sight, view=view)
 
 

@@ -93,7 +93,7 @@ class View:
         leans: whether the head is out of sight to the side, and what shows ends below where it is
             when somebody stands: whose height is known leans or falls out of the image.
         distance: metres at which it was seen.
-        walks: metres, how tall who is there has walked of late; None where nobody has.
+        walking_top: metres, how tall who is there has walked of late; None where nobody has.
         tilt: of the floor above which the top is.
     """
 
@@ -105,7 +105,7 @@ class View:
     described: Described | None = None
     leans: bool = False
     distance: float = 0.0
-    walks: float | None = None
+    walking_top: float | None = None
     tilt: Tilt = LEVEL
 
     @classmethod
@@ -453,14 +453,14 @@ class Gallery:
 
     def hear(self, heard: Heard, odds: float, view: View, weight: float, time: float) -> None:
         """Tell of a view that is of the same person by ``odds``, and what of that is its height."""
-        seen = view.top, view.distance, view.walks, math.inf, view.tilt
+        seen = view.top, view.distance, view.walking_top, math.inf, view.tilt
         height, tall = self.stature.log_odds(*seen), self.stature.as_tall(*seen)
         heard.hear(odds, weight, time, height=height, told=tall is not None)
 
     def _log_odds(
         self, view: View, alike: Sequence[float] | None, views: int, before: float = math.inf
     ) -> float:
-        odds = self.stature.log_odds(view.top, view.distance, view.walks, before, view.tilt)
+        odds = self.stature.log_odds(view.top, view.distance, view.walking_top, before, view.tilt)
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self._largest)

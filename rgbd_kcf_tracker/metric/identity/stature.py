@@ -121,7 +121,7 @@ class Stature:
         newest = [*self._newest, height] if height.top > LOWEST else self._newest
         self._set(newest, upright)
 
-    def of_late(self, time: float) -> float | None:
+    def walking_top(self, time: float) -> float | None:
         """How tall somebody has walked in the last second before ``time``; None if not enough."""
         late = [h.top for h in self._upright if h.walks and time - h.time < OF_LATE]
         return _upper(late) if len(late) >= TOLD else None
@@ -130,7 +130,7 @@ class Stature:
         self,
         top: float | None,
         distance: float,
-        walks: float | None = None,
+        walking_top: float | None = None,
         before: float = math.inf,
         tilt: Tilt = LEVEL,
     ) -> float:
@@ -141,19 +141,19 @@ class Stature:
         Args:
             top: metres above the floor, None where it is not known.
             distance: metres at which it was seen.
-            walks: metres, how tall who is there has walked of late, see :meth:`of_late`.
+            walking_top: metres, how tall who is there has walked of late, see :meth:`walking_top`.
             before: how tall he is is told by what was learned before, in seconds.
             tilt: of the floor.
         """
         odds = height_log_odds(top, self.top)
-        tall = self.as_tall(top, distance, walks, before, tilt)
+        tall = self.as_tall(top, distance, walking_top, before, tilt)
         return odds if tall is None else min(tall, odds)
 
     def as_tall(
         self,
         top: float | None,
         distance: float,
-        walks: float | None = None,
+        walking_top: float | None = None,
         before: float = math.inf,
         tilt: Tilt = LEVEL,
     ) -> float | None:
@@ -162,7 +162,7 @@ class Stature:
         Nobody is taller than upright, and who walks is as tall; others may stoop or sit. See
         :meth:`log_odds` for the rest.
         """
-        top = top if walks is None else walks
+        top = top if walking_top is None else walking_top
         known = self._by_distance
         if before < math.inf:
             known = [each for each in known if each.time < before]
@@ -175,7 +175,7 @@ class Stature:
         sigma = math.hypot(STEP * math.sqrt(1 + 1 / len(nearest)), tilt.sigma * apart)
         here_as = [h.top + tilt.slope * (distance - h.distance) for h in nearest]
         off = top - _upper(here_as)
-        if walks is None and off < -2 * sigma:
+        if walking_top is None and off < -2 * sigma:
             return None
         same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
         otherwise = max(RARELY, 0.5 / len(known))
