@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import cv2
@@ -16,6 +17,7 @@ from rgbd_kcf_tracker import TargetSet
 from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
 from rgbd_kcf_tracker.metric.identity.body import Placed
 from rgbd_kcf_tracker.pose import Pose
+from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.simulation.actors import FacesActor, mug
 from rgbd_kcf_tracker.simulation.build import kinect2_intrinsics
 from rgbd_kcf_tracker.simulation.motion import Motion
@@ -284,3 +286,17 @@ def test_who_wears_the_same_but_is_not_as_tall_is_not_the_target(seed: int):
         mistaken += box is not None and other is not None and box.iou(other) > 0.5
     assert mistaken <= RATE_HZ  # until he has walked some steps
     assert np.mean(has) > 0.85
+
+
+def test_who_comes_out_beside_a_walker_in_the_same_clothes_is_not_taken_for_him():
+    """He was, as the height of who had walked there was taken to be his."""
+    targets, number, mistaken = TargetSet('metric'), 0, 0
+    scene = simulate('comers_twins', seed=9002, size=(480, 360), rate_hz=5.0)
+    for sample in itertools.islice(scene, 30):
+        if not number:
+            assert sample.visible is not None
+            number = targets.add(sample.frame, sample.visible)
+            continue
+        box, twin = targets.update(sample.frame)[number].box, sample.truths[4].visible
+        mistaken += box is not None and twin is not None and box.iou(twin) > 0.5
+    assert mistaken == 0

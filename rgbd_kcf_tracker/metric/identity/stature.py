@@ -43,6 +43,10 @@ it is told how tall somebody walks now: those are of a step or two, and most of 
 RARELY = 0.01
 """Share of those who came back who are not as tall as they were: a hat, a load, another floor. As
 long as little is known it is more, half a height of as many as are known."""
+CHANGED, HIDDEN = 0.09, 0.1
+"""Metres by which nobody's height changes while he walks, three times :data:`STEP`: it is another
+who comes out beside him, or else his head is hidden, as in a tenth of the sightings of people who
+pass each other."""
 STANDS = 1.4
 """Metres from which a head is of somebody who stands: who sits on a chair is lower."""
 LOWEST = 1.2
@@ -162,7 +166,10 @@ class Stature:
         Nobody is taller than upright, and who walks is as tall; others may stoop or sit. See
         :meth:`log_odds` for the rest.
         """
-        top = top if walking_top is None else walking_top
+        changed = False
+        if walking_top is not None:
+            changed = top is not None and abs(top - walking_top) > CHANGED
+            top = top if changed else walking_top
         known = self._by_distance
         if before < math.inf:
             known = [each for each in known if each.time < before]
@@ -178,7 +185,7 @@ class Stature:
         if walking_top is None and off < -2 * sigma:
             return None
         same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
-        otherwise = max(RARELY, 0.5 / len(known))
+        otherwise = max(HIDDEN if changed else RARELY, 0.5 / len(known))
         return math.log((1 - otherwise) * same / other + otherwise)
 
     def take(self, other: Stature) -> None:
