@@ -333,30 +333,30 @@ def walked(top: float, count: int = 10, distance: float = 3.0, start: float = 0.
 
 def test_nobody_is_taller_than_he_walks_and_who_walks_is_as_tall():
     known = walked(1.7)
-    assert known.log_odds(None, 3.0) == 0.0
+    assert known.log_odds(None, 3.0).odds == 0.0
     # Most people are about as tall: a height that fits says as little as before.
     for walks in (1.7, None):
-        assert known.log_odds(1.7, 3.0, walks) == height_log_odds(1.7, 1.7)
-    assert known.log_odds(1.85, 3.0) < -2.5
-    assert known.log_odds(1.85, 3.0, 1.85) < -2.5
-    assert known.log_odds(1.55, 3.0, 1.55) < -2.5
+        assert known.log_odds(1.7, 3.0, walks).odds == height_log_odds(1.7, 1.7)
+    assert known.log_odds(1.85, 3.0).odds < -2.5
+    assert known.log_odds(1.85, 3.0, 1.85).odds < -2.5
+    assert known.log_odds(1.55, 3.0, 1.55).odds < -2.5
     # Who has not walked may have bent down, or sit.
-    assert known.log_odds(1.55, 3.0) == height_log_odds(1.55, 1.7) > -0.5
+    assert known.log_odds(1.55, 3.0).odds == height_log_odds(1.55, 1.7) > -0.5
     # Nor does who walks change; but his head may be hidden.
-    assert -2.5 < known.log_odds(1.55, 3.0, 1.7) < -2.0
-    assert known.log_odds(1.65, 3.0, 1.7) == height_log_odds(1.65, 1.7)
+    assert -2.5 < known.log_odds(1.55, 3.0, 1.7).odds < -2.0
+    assert known.log_odds(1.65, 3.0, 1.7).odds == height_log_odds(1.65, 1.7)
 
 
 def test_how_tall_somebody_walks_is_known_after_some_steps_and_better_after_more():
     few = walked(1.7, TOLD - 1)
-    assert few.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
-    some, many = (walked(1.7, n).log_odds(1.85, 3.0) for n in (TOLD, 20))
+    assert few.log_odds(1.85, 3.0).odds == height_log_odds(1.85, 1.7)
+    some, many = (walked(1.7, n).log_odds(1.85, 3.0).odds for n in (TOLD, 20))
     assert many < some < height_log_odds(1.85, 1.7)
     # Heights within a tenth of a second are of one step.
     quick = Stature()
     for n in range(TOLD * 2):
         quick.learn(Height(1.7, 3.0, n / 30, walks=True))
-    assert quick.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7)
+    assert quick.log_odds(1.85, 3.0).odds == height_log_odds(1.85, 1.7)
     assert quick.walking_top(0.2) is None
     assert walked(1.7).walking_top(1.0) == 1.7
     assert walked(1.7).walking_top(3.0) is None
@@ -364,16 +364,16 @@ def test_how_tall_somebody_walks_is_known_after_some_steps_and_better_after_more
 
 def test_a_floor_out_of_true_makes_heights_at_another_distance_say_less():
     known = walked(1.7)
-    near, far = (known.log_odds(1.85, distance) for distance in (3.0, 5.0))
+    near, far = (known.log_odds(1.85, distance).odds for distance in (3.0, 5.0))
     assert near < -2.5
     assert far > -1
     known.take(walked(1.7, distance=5.0, start=9.0))
-    assert known.log_odds(1.85, 5.0) < -2.5
+    assert known.log_odds(1.85, 5.0).odds < -2.5
     # What is known of it there is what is held against.
     sloping = walked(1.7)
     sloping.take(walked(1.85, distance=5.0, start=9.0))
-    assert sloping.log_odds(1.85, 5.0) > 0
-    assert sloping.log_odds(1.85, 3.0) < -2.5
+    assert sloping.log_odds(1.85, 5.0).odds > 0
+    assert sloping.log_odds(1.85, 3.0).odds < -2.5
 
 
 def test_who_is_higher_than_anybody_sits_is_upright_and_a_hidden_head_is_not_asked():
@@ -381,18 +381,18 @@ def test_who_is_higher_than_anybody_sits_is_upright_and_a_hidden_head_is_not_ask
     for n in range(20):
         standing.learn(Height(1.7, 3.0, 0.1 * n))
         sitting.learn(Height(1.3, 3.0, 0.1 * n))
-    assert standing.log_odds(1.85, 3.0) < -2.5
+    assert standing.log_odds(1.85, 3.0).odds < -2.5
     assert standing.walking_top(2.0) is None, 'he has not walked'
     # Who sits may get up.
-    assert sitting.log_odds(1.7, 3.0) == height_log_odds(1.7, 1.3)
+    assert sitting.log_odds(1.7, 3.0).odds == height_log_odds(1.7, 1.3)
     touching = Stature()
     for n in range(20):
         touching.learn(Height(1.7, 3.0, 0.1 * n, walks=True), alone=False)
-    assert touching.log_odds(1.85, 3.0) == height_log_odds(1.85, 1.7), 'it may be of another'
+    assert touching.log_odds(1.85, 3.0).odds == height_log_odds(1.85, 1.7), 'it may be of another'
     # Farther off than all others he was half hidden.
     hidden = walked(1.7)
     hidden.take(walked(1.4, distance=3.2, start=9.0, count=7))
-    assert hidden.log_odds(1.7, 4.0) > 0
+    assert hidden.log_odds(1.7, 4.0).odds > 0
 
 
 @pytest.mark.parametrize('slope', [-0.06, 0.0, 0.06])
@@ -410,10 +410,10 @@ def test_who_walks_near_and_far_tells_how_far_the_floor_is_out_of_true(slope: fl
     # Where the floor is known, heights at another distance say as much as at the same.
     near = walked(1.7, 20, distance=2.0)
     far = 1.7 + 3 * slope
-    same = near.as_tall(far, 5.0, tilt=tilt)
+    same = near.log_odds(far, 5.0, tilt=tilt).tall
     assert same is not None
     assert same > 1
-    assert near.log_odds(far + 0.15, 5.0, tilt=tilt) < -2 < near.log_odds(1.85, 5.0)
+    assert near.log_odds(far + 0.15, 5.0, tilt=tilt).odds < -2 < near.log_odds(1.85, 5.0).odds
 
 
 def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them():
@@ -423,13 +423,13 @@ def test_heights_are_bounded_and_a_mistake_of_some_seconds_does_not_replace_them
     assert len(stature._upright) == UPRIGHT
     assert len(stature._newest) == NEWEST
     assert stature.top == 1.5
-    assert stature.log_odds(1.85, 3.0, before=100.0) < -2.5
+    assert stature.log_odds(1.85, 3.0, before=100.0).odds < -2.5
     late = stature.taken_back(100.0)
     assert (stature.top, late.top) == (None, 1.5)
     assert (
-        stature.log_odds(1.5, 3.0, walking_top=1.5)
+        stature.log_odds(1.5, 3.0, walking_top=1.5).odds
         < -2.5
-        < late.log_odds(1.5, 3.0, walking_top=1.5)
+        < late.log_odds(1.5, 3.0, walking_top=1.5).odds
     )
 
 

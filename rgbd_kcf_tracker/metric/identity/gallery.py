@@ -23,7 +23,14 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.metric.identity.embedding import Described
-from rgbd_kcf_tracker.metric.identity.stature import LEVEL, SEATED, Stature, Tilt, height_log_odds
+from rgbd_kcf_tracker.metric.identity.stature import (
+    LEVEL,
+    SEATED,
+    HeightOdds,
+    Stature,
+    Tilt,
+    height_log_odds,
+)
 from rgbd_kcf_tracker.metric.identity.tally import Heard
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
@@ -453,14 +460,16 @@ class Gallery:
 
     def hear(self, heard: Heard, odds: float, view: View, weight: float, time: float) -> None:
         """Tell of a view that is of the same person by ``odds``, and what of that is its height."""
-        seen = view.top, view.distance, view.walking_top, math.inf, view.tilt
-        height, tall = self.stature.log_odds(*seen), self.stature.as_tall(*seen)
-        heard.hear(odds, weight, time, height=height, told=tall is not None)
+        height = self._height_log_odds(view)
+        heard.hear(odds, weight, time, height=height.odds, told=height.tall is not None)
+
+    def _height_log_odds(self, view: View, before: float = math.inf) -> HeightOdds:
+        return self.stature.log_odds(view.top, view.distance, view.walking_top, before, view.tilt)
 
     def _log_odds(
         self, view: View, alike: Sequence[float] | None, views: int, before: float = math.inf
     ) -> float:
-        odds = self.stature.log_odds(view.top, view.distance, view.walking_top, before, view.tilt)
+        odds = self._height_log_odds(view, before).odds
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self._largest)

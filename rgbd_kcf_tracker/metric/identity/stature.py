@@ -77,6 +77,18 @@ class Height(NamedTuple):
         return self.walks or self.top > STANDS
 
 
+class HeightOdds(NamedTuple):
+    """What a height says of who it is of.
+
+    Attributes:
+        odds: log-odds that it is of the same person.
+        tall: the same by how tall he is alone; None where nothing tells that.
+    """
+
+    odds: float
+    tall: float | None = None
+
+
 class Tilt(NamedTuple):
     """How far the floor is out of true: metres that heights grow by with each metre of distance.
 
@@ -137,10 +149,11 @@ class Stature:
         walking_top: float | None = None,
         before: float = math.inf,
         tilt: Tilt = LEVEL,
-    ) -> float:
+    ) -> HeightOdds:
         """Log-odds that a head's height is the person's rather than anybody's.
 
-        A height that fits says little, as most people are about as tall.
+        Nobody is taller than upright, and who walks is as tall; others may stoop or sit. A height
+        that fits says little, as most people are about as tall.
 
         Args:
             top: metres above the floor, None where it is not known.
@@ -150,22 +163,6 @@ class Stature:
             tilt: of the floor.
         """
         odds = height_log_odds(top, self.top)
-        tall = self.as_tall(top, distance, walking_top, before, tilt)
-        return odds if tall is None else min(tall, odds)
-
-    def as_tall(
-        self,
-        top: float | None,
-        distance: float,
-        walking_top: float | None = None,
-        before: float = math.inf,
-        tilt: Tilt = LEVEL,
-    ) -> float | None:
-        """Log-odds that somebody is as tall; None where nothing tells.
-
-        Nobody is taller than upright, and who walks is as tall; others may stoop or sit. See
-        :meth:`log_odds` for the rest.
-        """
         changed = False
         if walking_top is not None:
             changed = top is not None and abs(top - walking_top) > CHANGED
@@ -174,7 +171,7 @@ class Stature:
         if before < math.inf:
             known = [each for each in known if each.time < before]
         if top is None or len(known) < TOLD:
-            return None
+            return HeightOdds(odds)
         here = bisect(known, distance, key=_distance)
         around = known[max(here - NEAREST, 0) : here + NEAREST]
         nearest = sorted(around, key=lambda each: abs(each.distance - distance))[:NEAREST]
@@ -183,10 +180,11 @@ class Stature:
         here_as = [h.top + tilt.slope * (distance - h.distance) for h in nearest]
         off = top - _upper(here_as)
         if walking_top is None and off < -2 * sigma:
-            return None
+            return HeightOdds(odds)
         same, other = _normal(off, sigma), _normal(off, math.hypot(sigma, SPREAD))
         otherwise = max(HIDDEN if changed else RARELY, 0.5 / len(known))
-        return math.log((1 - otherwise) * same / other + otherwise)
+        tall = math.log((1 - otherwise) * same / other + otherwise)
+        return HeightOdds(min(tall, odds), tall)
 
     def take(self, other: Stature) -> None:
         """Take all that another has, which has turned out to be of the same person."""
