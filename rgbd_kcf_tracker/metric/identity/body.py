@@ -168,8 +168,8 @@ class Body:
     def _histograms(
         self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float
     ) -> Floats:
-        row, rows = self._rows(seen, view, top)
-        return band_histograms(codes[seen.rows, seen.cols], seen.mask, row, rows)
+        rows = self._rows(seen, view, top)
+        return band_histograms(codes[seen.rows, seen.cols], seen.mask, *rows)
 
     def odds_of(self, codes: Codes, seen: Silhouette, view: DepthView, top: float) -> Floats:
         """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
@@ -177,8 +177,7 @@ class Body:
         ``codes`` are ``(h, n)`` with the silhouette's rows; the body's upper edge is at ``top``
         metres.
         """
-        row, rows = self._rows(seen, view, top)
-        band = _bands_of_rows(len(codes), row, rows)
+        band = _bands_of_rows(len(codes), *self._rows(seen, view, top))
         if self._odds is None:
             floor = np.float32(ODDS_FLOOR)
             odds = np.log((self._colors + floor) / (self._around + floor))

@@ -130,7 +130,7 @@ class Comeback:
 
     def _look(self, heard: Heard, view: View, time: float) -> None:
         if time - heard.last >= AGAIN and self.known.stands(view.top, view.leans):
-            self.known.hear(heard, self.known.log_odds(view), view, view.shows**2, time)
+            self.known.hear(heard, self.known.log_odds(view), view, time)
 
     @property
     def enough(self) -> bool:

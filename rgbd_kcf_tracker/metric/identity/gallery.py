@@ -412,6 +412,7 @@ class Gallery:
         views: the first and the newest.
         looks: the same stacked, None while there is none.
         stature: the heights of the head.
+        largest: square metres of the view that shows most, 0 while there is none.
         mixed: whether the only view is of a piece cut out of two who touched, so that it shows
             something of either: it speaks against nobody until a view of one alone takes its place.
     """
@@ -422,12 +423,12 @@ class Gallery:
         self.looks: Looks | None = None
         self.stature = Stature()
         self._learned: list[_Learned] = []
-        self._largest = 0.0
+        self.largest = 0.0
 
     @property
     def whole(self) -> bool:
         """Whether one of the views shows all of him."""
-        return self._largest >= WHOLE_AREA
+        return self.largest >= WHOLE_AREA
 
     def stands(self, top: float | None, leans: bool = False) -> bool:
         """Whether who is as high as ``top`` metres may stand or sit, and not lie or crawl.
@@ -458,10 +459,11 @@ class Gallery:
             return None
         return self._log_odds(view, np.fmax.reduce(old).tolist(), len(old), time)
 
-    def hear(self, heard: Heard, odds: float, view: View, weight: float, time: float) -> None:
+    def hear(self, heard: Heard, odds: float, view: View, time: float) -> None:
         """Tell of a view that is of the same person by ``odds``, and what of that is its height."""
         height = self._height_log_odds(view)
-        heard.hear(odds, weight, time, height=height.odds, told=height.tall is not None)
+        told = height.tall is not None
+        heard.hear(odds, view.shows**2, time, height=height.odds, told=told)
 
     def _height_log_odds(self, view: View, before: float = math.inf) -> HeightOdds:
         return self.stature.log_odds(view.top, view.distance, view.walking_top, before, view.tilt)
@@ -472,7 +474,7 @@ class Gallery:
         odds = self._height_log_odds(view, before).odds
         if alike is None or math.isnan(alike[0]):
             return odds
-        area = min(view.total, self._largest)
+        area = min(view.total, self.largest)
         look = look_log_odds(alike[0], area, views, view.grey, alike[1])
         return odds + (max(look, 0.0) if self.mixed else look)
 
@@ -551,7 +553,7 @@ class Gallery:
         self._learned, self.views = learned, [each.view for each in learned]
         trust = [each.trust for each in learned]
         self.looks = Looks.of(self.views, trust) if learned else None
-        self._largest = max((view.total for view in self.views), default=0.0)
+        self.largest = max((view.total for view in self.views), default=0.0)
 
     def _most_redundant(self) -> int:
         """Of those least trusted the one most alike another, the older of two.

@@ -160,23 +160,21 @@ class Person:
     def place_log_odds(self, places: FloatArray, time: float) -> FloatArray:
         """Log-odds, ``(n,)``, of being at ``places`` ``(n, 2)`` rather than anybody else."""
         gone = time - self.seen_at
-        off = _off(places, self.expected(time))
         steady = STEADY if self.sightings > 2 and gone < COAST else 1.0
         variance = PLACE_SIGMA**2 + (WALKING * steady * min(gone, FORGET)) ** 2
         anywhere = max(ANYWHERE, 1 - float(np.exp(-((gone / FORGET) ** 2))))
-        walks = _density(off, variance)
+        walks = _density(places, self.expected(time), variance)
         if self.misses and self.hidden:
             variance = PLACE_SIGMA**2 + (WALKING * min(gone, FORGET)) ** 2
-            turned = _density(_off(places, self.place), variance)
+            turned = _density(places, self.place, variance)
             walks = (1 - TURNED) * walks + TURNED * turned
         walks = (1 - anywhere) * walks * ROOM_AREA + anywhere
         stands = self._stands(gone)
         if stands == 0:
             return np.log(walks)
         swayed = PLACE_SIGMA**2 + (SWAYING * min(gone, COAST)) ** 2
-        still = _density(_off(places, self.place), swayed)
-        odds = np.log(stands * still * ROOM_AREA + (1 - stands) * walks)
-        return odds
+        still = _density(places, self.place, swayed)
+        return np.log(stands * still * ROOM_AREA + (1 - stands) * walks)
 
     def _stands(self, gone: float) -> float:
         """Probability that it still stands where it was seen ``gone`` seconds ago."""
@@ -219,7 +217,7 @@ class Person:
         The ``other`` is not in view.
         """
         heard = self._resembles.setdefault(other.number, Heard())
-        other.gallery.hear(heard, odds, view, view.shows**2, time)
+        other.gallery.hear(heard, odds, view, time)
 
     def resemblance(self, other: int) -> float | None:
         """Mean log-odds of looking like another, in the sightings of late; None for none."""
@@ -320,12 +318,10 @@ class Person:
             self.travelled = max(self.travelled, float(np.hypot(*(place - self.first_place))))
 
 
-def _off(places: FloatArray, place: FloatArray) -> FloatArray:
-    """Squared distances of ``places`` ``(n, 2)`` from one, ``(n,)``."""
-    off: FloatArray = np.square(places - place).sum(axis=1)
-    return off
+def _density(places: FloatArray, place: FloatArray, variance: float) -> FloatArray:
+    """Of somebody about ``place`` at each of ``places``, ``(n, 2)``, to the square metre, ``(n,)``.
 
-
-def _density(squared: FloatArray, variance: float) -> FloatArray:
-    """Of a place at squared distances ``(n,)``, to the square metre, for a variance each way."""
+    ``variance`` is that along either axis, in square metres.
+    """
+    squared: FloatArray = np.square(places - place).sum(axis=1)
     return np.exp(-0.5 * squared / variance) / (2 * np.pi * variance)
