@@ -419,7 +419,7 @@ def test_a_part_of_somebody_is_judged_by_what_the_network_says_of_all_of_him():
     account = targets.metric.account
     assert account is not None
     (sight,) = account.sights
-    seen = sight.figure.seen
+    seen = sight.seen
     upper = dataclasses.replace(seen, mask=seen.mask[: int(0.6 * len(seen.mask))])
     first = min(targets.metric._crowd.people, key=lambda person: person.number)
     assert first.gallery.log_odds(account.look(upper)) < 0

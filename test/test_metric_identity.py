@@ -38,7 +38,7 @@ from rgbd_kcf_tracker.metric import follower
 from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface
 from rgbd_kcf_tracker.metric.decide import evidence
-from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, Sight, look_of
+from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account, look_of
 from rgbd_kcf_tracker.metric.decide.arrivals import (
     GONE,
     RETURN,
@@ -648,7 +648,7 @@ def test_who_was_hidden_may_have_turned_round_meanwhile(missed: bool):
     for i in range(1, 6):
         one.moved_to(np.array([0.28 * i, 3.0]), 0.2 * i)
     if missed:  # behind somebody who is nearer than he was
-        sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+        sight = Watched().see(Someone(0.0, 3.0)).sights[0].seen
         one.last = sight
         one.missed(np.full((ROWS, COLS), sight.depth - 1.0, np.float32))
     ahead, back = one.place_log_odds(np.array([one.expected(1.8), [1.4, 3.0]]), 1.8)
@@ -690,7 +690,7 @@ def test_who_stood_stands_there_still_unless_the_camera_sees_past_his_place(
     behind: float, stays: bool
 ):
     account = Watched().see(Someone(0.0, 3.0))
-    sight = account.sights[0].figure.seen
+    sight = account.sights[0].seen
     one = Person(1, np.array([0.0, 3.0]), 0.0)
     for i in range(1, 5):
         one.moved_to(np.array([0.0, 3.0]), 0.5 * i)
@@ -716,7 +716,7 @@ def test_a_thing_that_was_moved_is_nobody_until_it_walks_or_stands_upright():
 
 @pytest.mark.parametrize('cut_off', ['', 'left', 'top', 'right', 'bottom'])
 def test_what_is_short_has_a_persons_size_where_a_side_of_it_is_cut_off(cut_off: str):
-    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    sight = Watched().see(Someone(0.0, 3.0)).sights[0].seen
     short = sight.mask[: round(0.6 * len(sight.mask))]  # as who sits
     sides = Sides(*(side == cut_off for side in ('left', 'top', 'right', 'bottom')))
     left, top, right, bottom = sight.metres
@@ -741,7 +741,7 @@ def test_a_head_and_shoulders_above_the_images_end_are_somebody_near(
     top: float | None, cut_off: set[str], sized: bool
 ):
     """Who passed close to the camera was nobody for half a second."""
-    sight = Watched().see(Someone(0.0, 3.0)).sights[0].figure.seen
+    sight = Watched().see(Someone(0.0, 3.0)).sights[0].seen
     share = 0.5 / sight.height
     mask = sight.mask[: round(share * len(sight.mask))]
     sides = Sides(*(side in cut_off for side in ('left', 'top', 'right', 'bottom')))
@@ -854,7 +854,7 @@ def test_who_stood_there_is_no_part_of_the_room_when_the_camera_turns_back(why: 
     account = crowd.explain(scene, 1.0, reader.is_somebody)
     assert len(account.sights) == (why == 'stayed')
     if why == 'stayed':
-        assert box_about(scene, account.sights[0].figure.seen).iou(one.box.clipped(COLS, 60)) > 0.8
+        assert box_about(scene, account.sights[0].seen).iou(one.box.clipped(COLS, 60)) > 0.8
 
 
 def test_a_person_stays_in_the_world_while_the_camera_turns():
@@ -1317,7 +1317,7 @@ class Watched:
             account = self.see(
                 Someone(-0.9 + 0.05 * i, 3.0, left), Someone(0.9 - 0.03 * i, 3.0, right)
             )
-        return account, sorted(range(2), key=lambda c: account.sights[c].figure.place[0])
+        return account, sorted(range(2), key=lambda c: account.sights[c].place[0])
 
     def leaves(self, person: Person) -> Callable[[Account], dict[int, None]]:
         """He is chosen and goes away; what the one who follows him says of each frame since."""
@@ -1393,11 +1393,10 @@ def test_little_of_somebody_is_somebody_where_it_reaches_up_to_where_heads_are(
     watched = Watched()
     people = [Someone(1.93, 3.0, RED)] + ([Someone(1.35, 3.2, BLUE)] if beside else [])
     account = watched.explain(*people)
-    small = min(range(len(account.sights)), key=lambda n: account.sights[n].figure.seen.area)
+    small = min(range(len(account.sights)), key=lambda n: account.sights[n].seen.area)
     sight = account.sights[small]
-    assert sight.figure.seen.area < NEW_AREA
-    figure = dataclasses.replace(sight.figure, parted=parted)
-    account.sights[small] = Sight(figure, sight.view)
+    assert sight.seen.area < NEW_AREA
+    account.sights[small] = dataclasses.replace(sight, parted=parted)
     monkeypatch.setattr(Scene, 'top', lambda scene, seen: top)
     watched.crowd.learn(account, {})
     assert (account.owner[small] >= 0) == somebody
@@ -1458,9 +1457,7 @@ def test_two_who_change_places_keep_who_they_are():
     for i in range(24):
         x = -0.9 + 0.075 * i
         account = watched.see(Someone(x, 2.5, RED), Someone(-x, 3.5, GREEN, GREY))
-        by_depth = sorted(
-            range(len(account.sights)), key=lambda c: account.sights[c].figure.place[1]
-        )
+        by_depth = sorted(range(len(account.sights)), key=lambda c: account.sights[c].place[1])
         if len(by_depth) == 2 and left is None and i > 3:
             left, right = (who(account, c) for c in by_depth)
     assert left is not None
@@ -1483,10 +1480,10 @@ def test_two_who_were_seen_together_are_never_made_one():
         if not together:
             other = watched.crowd.welcome(np.array([1.0, 3.0]), watched.time)
             account = watched.see(Someone(1.0, 3.0, RED))
-        column = max(range(len(account.sights)), key=lambda c: account.sights[c].figure.place[0])
+        column = max(range(len(account.sights)), key=lambda c: account.sights[c].place[0])
         account.owner[column] = account.people.index(other)
         # What follows the target says that it is where the other one is.
-        watched.crowd.learn(account, {chosen.number: account.sights[column].figure.seen})
+        watched.crowd.learn(account, {chosen.number: account.sights[column].seen})
         assert (other in watched.crowd.people) == together
 
 
@@ -1514,7 +1511,7 @@ def test_who_comes_back_is_explained_as_himself_from_the_first_sight_on_and_othe
         claims = []
         for i in range(6):
             account = watched.see(Someone(-0.8 + 0.1 * i, 2.5, shirt), targets=hidden)
-            seen = account.sights[0].figure.seen
+            seen = account.sights[0].seen
             claims.append(account.claim(chosen, seen).assigned)
         # Before, the number that he got with his first sight explained him from the second on.
         assert set(claims) <= said
@@ -1573,7 +1570,7 @@ def test_nothing_but_the_place_is_learned_of_who_may_be_somebody_else(sure: bool
     views = len(one.gallery.views)
 
     def found(account: Account):
-        return {one.number: account.sights[0].figure.seen}
+        return {one.number: account.sights[0].seen}
 
     unsure = () if sure else {one.number}
     for i in range(3):
@@ -1619,7 +1616,7 @@ def test_of_what_is_too_small_for_a_figure_no_figure_is_asked():
     watched = Watched()
     watched.see(Someone(0.0, 3.0, RED), Someone(1.2, 3.0, BLUE))
     account = watched.see(Someone(0.0, 3.0, RED), Someone(1.2, 3.0, BLUE))
-    one, seen = who(account, 0), account.sights[1].figure.seen
+    one, seen = who(account, 0), account.sights[1].seen
     assert account.claim(one, seen).assigned == -1
     one.area = 0.5 * SMALL
     assert account.claim(one, seen).assigned == 1
@@ -1630,7 +1627,7 @@ def test_what_belongs_to_one_who_was_met_cannot_be_claimed():
     account, columns = watched.beside(RED, BLUE)
     one = who(account, columns[0])
     others = account.others(one)
-    mine, theirs = (account.sights[c].figure.seen for c in columns)
+    mine, theirs = (account.sights[c].seen for c in columns)
     assert others.share(theirs) == 1
     assert others.share(mine) == 0
     assert others.within(theirs.rows, theirs.cols)[theirs.mask].all()
@@ -2652,7 +2649,7 @@ def test_who_once_showed_whole_is_not_taken_for_a_part_when_he_is_half_hidden_ag
             targets.update(frame)
     followed, account = targets._followers[number], targets.account
     assert account is not None
-    whole = account.sights[0].figure.seen
+    whole = account.sights[0].seen
     mask = whole.mask.copy()
     mask[:, mask.shape[1] // 3 :] = False
     part = dataclasses.replace(whole, mask=mask, area=whole.area / 3)

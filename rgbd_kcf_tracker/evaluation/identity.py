@@ -134,7 +134,7 @@ def metric_views(parameters: Parameters | None = None) -> Views:
         account = targets.account
         if account is None:
             return None
-        near = [outline_box(account.scene, s.figure.seen).iou(box) for s in account.sights]
+        near = [outline_box(account.scene, s.seen).iou(box) for s in account.sights]
         best = max(range(len(near)), key=near.__getitem__, default=-1)
         return account.sights[best].view if best >= 0 and near[best] >= SAME_FIGURE_IOU else None
 

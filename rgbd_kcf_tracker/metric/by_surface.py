@@ -183,11 +183,11 @@ class BySurface:
         most = STANDING if self.person not in account.in_view else MIXED
         free = [seen for seen in found if others.share(seen) < most]
         free += [
-            sight.figure.seen
+            sight.seen
             for kind, sight in enumerate(account.sights, FIRST)
             if not others.theirs[kind]
-            and sight.figure.seen.area < MOST_SHARE * self.body.area
-            and not any(sight.figure.seen.same(other) for other in free)
+            and sight.seen.area < MOST_SHARE * self.body.area
+            and not any(sight.seen.same(other) for other in free)
         ]
         self.candidates = [
             c

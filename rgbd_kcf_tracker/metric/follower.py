@@ -16,7 +16,7 @@ from rgbd_kcf_tracker.metric.by_look import ByLook, Look
 from rgbd_kcf_tracker.metric.by_surface import BySurface, Candidate
 from rgbd_kcf_tracker.metric.dark import Dark
 from rgbd_kcf_tracker.metric.decide.account import REUNION, SMALL, Account
-from rgbd_kcf_tracker.metric.decide.arrivals import away, bounded
+from rgbd_kcf_tracker.metric.decide.arrivals import bounded
 from rgbd_kcf_tracker.metric.decide.crowd import Crowd
 from rgbd_kcf_tracker.metric.decide.cues import Cue
 from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW
@@ -338,7 +338,7 @@ class Follower:
         # but a thing that was in view until the camera paused is hardly another one.
         part = person.figure and surface.hidden_for > 0
         new = account.owner[index] < 0 if index >= 0 else part
-        against = account.against_chosen * away(account.time - person.seen_at)
+        against = account.against_chosen(person)
         if new or (stranger is not None and not _recognised(stranger, person, account.time)):
             box = surface.box(account.scene, found)
             belief = surface.glimpse(account.scene, found)
@@ -408,14 +408,14 @@ class Follower:
         index = account.sight_of(seen)
         if index < 0:
             return None
-        figure, owner = account.sights[index].figure, account.owner_of(index)
-        if figure.parted or figure.seen.area < MORE * max(seen.area, self._shown):
+        sight, owner = account.sights[index], account.owner_of(index)
+        if sight.parted or sight.seen.area < MORE * max(seen.area, self._shown):
             return None
-        if not TALLER < figure.seen.height < HEIGHT[1] or figure.seen.width > WIDTH[1]:
+        if not TALLER < sight.seen.height < HEIGHT[1] or sight.seen.width > WIDTH[1]:
             return None
         if owner is not None and owner is not person:
             return None
-        return figure.seen if _as_deep(account, figure.seen, seen) else None
+        return sight.seen if _as_deep(account, sight.seen, seen) else None
 
     def _as_drawn(self, account: Account, seen: Silhouette) -> Silhouette | None:
         """Who is where a box was drawn a moment ago, if what was taken for the target is not.
@@ -428,8 +428,8 @@ class Follower:
         if box_about(scene, seen).iou(self._drawn) >= LOCK_IOU:
             return None
         for sight, owner in zip(account.sights, account.owner, strict=True):
-            if owner < 0 and box_about(scene, sight.figure.seen).iou(self._drawn) >= LOCK_IOU:
-                return sight.figure.seen
+            if owner < 0 and box_about(scene, sight.seen).iou(self._drawn) >= LOCK_IOU:
+                return sight.seen
         return None
 
     def _anew(self, account: Account, person: Person, whole: Silhouette) -> BySurface:
@@ -574,16 +574,16 @@ class Follower:
         index = max(likely, key=lambda each: likely[each][0])
         mine, stranger = likely[index]
         sight = account.sights[index]
-        against = account.against_chosen * away(account.time - person.seen_at)
+        against = account.against_chosen(person)
         others = math.exp(against) + account.as_others(person, index)
         score = mine / (sum(odds for odds, _ in likely.values()) + others)
         # Nor is of a fragment seen past somebody else known how large he is, who is to be followed.
         enough = _recognised(stranger, person, account.time) and stranger.upright
-        enough = enough and not sight.figure.seen.cut.top
-        if not enough or sight.figure.parted or score < EVEN:
+        enough = enough and not sight.seen.cut.top
+        if not enough or sight.parted or score < EVEN:
             return None
         self._comeback = Comeback(person, account.time, against)
-        return sight.figure.seen, score
+        return sight.seen, score
 
     # -- answers ----------------------------------------------------------------------------------
 

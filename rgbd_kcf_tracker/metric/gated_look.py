@@ -310,7 +310,7 @@ class GatedLook:
             return False
         if _area(account.scene.view, look) < SMALL:
             return bool(np.count_nonzero(account.scene.before[part]) < (1 - IS_ROOM) * depth.size)
-        outlines = (box_about(account.scene, s.figure.seen) for s in account.sights)
+        outlines = (box_about(account.scene, s.seen) for s in account.sights)
         return all(outline.iou(box) < LOCK_IOU for outline in outlines)
 
     def _may_have_gone(self, look: Look | None) -> bool:

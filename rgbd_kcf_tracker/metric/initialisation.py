@@ -294,7 +294,7 @@ def _largest_shown(scene: Scene, shown: npt.NDArray[np.intp]) -> int:
 
 def _figure_of(account: Account, box: Box) -> Silhouette | None:
     """The figure that a box is drawn about, of which limbs may be missing."""
-    figures = [sight.figure.seen for sight in account.sights]
+    figures = [sight.seen for sight in account.sights]
     if not figures:
         return None
     outlines = [box_about(account.scene, seen) for seen in figures]
@@ -363,7 +363,7 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
     """What has the shape of a person; or the size, of what the image's ends cut off."""
     scene = account.scene
     for index, sight in enumerate(account.sights):
-        seen, owner = sight.figure.seen, account.owner_of(index)
+        seen, owner = sight.seen, account.owner_of(index)
         known = owner is not None and owner.upright
         if known or upright(seen, scene.view.intrinsics, account.look(seen).top):
             yield seen

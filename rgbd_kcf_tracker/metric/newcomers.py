@@ -74,7 +74,7 @@ class Newcomers:
         self.beside |= {
             person.number
             for person, index in account.in_view.items()
-            if box_about(account.scene, account.sights[index].figure.seen).intersection(box) == 0
+            if box_about(account.scene, account.sights[index].seen).intersection(box) == 0
         }
 
     def find(
@@ -110,11 +110,11 @@ class Newcomers:
             met = person is not None and (self.was_there(person) or person.number in self.beside)
             if met and account.looks[row, column] > 0:
                 continue
-            if sight.figure.parted:  # where it ends is a guess
+            if sight.parted:  # where it ends is a guess
                 continue
             if drawn is not None and drawn.unlike(sight.view):
                 continue
-            seen, scene = sight.figure.seen, account.scene
+            seen, scene = sight.seen, account.scene
             outline = box_about(scene, seen)
             ends = scene.ends(outline)
             shown, least = _to_side(outline, ends, scene), outline.area

@@ -59,28 +59,24 @@ class PersonFinder:
         account = self._targets.account
         if account is None:
             return None
-        found: list[Sight] = []
+        found: list[Silhouette] = []
         for person, index in account.in_view.items():
             sight = account.sights[index]
-            if not self._near < sight.figure.seen.depth < self._far:
+            if not self._near < sight.seen.depth < self._far:
                 continue
             sure = person.alive and person.sightings >= SIGHTINGS
-            if (
-                sure
-                and whole(account.scene, sight)
-                and rounded(account.scene.view, sight.figure.seen)
-            ):
-                found.append(sight)
+            if sure and whole(account.scene, sight) and rounded(account.scene.view, sight.seen):
+                found.append(sight.seen)
         if not found:
             return None
-        nearest = min(found, key=lambda s: s.figure.seen.depth).figure.seen
+        nearest = min(found, key=lambda seen: seen.depth)
         return outline_box(account.scene, nearest).clipped(frame.width, frame.height)
 
 
 def whole(scene: Scene, sight: Sight) -> bool:
     """Whether a sight shows somebody from head to hips and from side to side."""
-    seen, top = sight.figure.seen, scene.top(sight.figure.seen)
-    if sight.figure.parted or seen.cut.left or seen.cut.top or seen.cut.right:
+    seen, top = sight.seen, scene.top(sight.seen)
+    if sight.parted or seen.cut.left or seen.cut.top or seen.cut.right:
         return False
     if seen.height < max(LEAST_HEIGHT, ASPECT * seen.width):
         return False

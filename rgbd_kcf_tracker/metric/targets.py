@@ -282,7 +282,7 @@ class MetricTargets:
         for person, index in account.in_view.items():
             if person.number in self._names:
                 continue
-            box = outline_box(account.scene, account.sights[index].figure.seen)
+            box = outline_box(account.scene, account.sights[index].seen)
             for name, track in before.items():
                 near = track.box is not None and track.box.iou(box) >= SAME_BOX
                 if near and name not in names.values():
@@ -421,7 +421,7 @@ class MetricTargets:
         for person, index in account.in_view.items():
             if index in shown or person.number in chosen or not person.alive:
                 continue
-            seen = account.sights[index].figure.seen
+            seen = account.sights[index].seen
             box = outline_box(account.scene, seen)
             belief = in_metres(sighted(account.scene.view, seen), frame)
             tracks[self._name(person)] = Track(

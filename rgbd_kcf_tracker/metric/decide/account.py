@@ -14,7 +14,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, is_new
+from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, away, is_new
 from rgbd_kcf_tracker.metric.decide.parts import FIRST, ROOM, Others, Parts
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.describer import Describer
@@ -67,11 +67,10 @@ at 5 Hz. By then a walker may be a metre from there, and who is not there is not
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class Sight(Figure):
     """A figure with its look."""
 
-    figure: Figure
-    view: View
+    view: View = field(kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +120,7 @@ class Account:
     @cached_property
     def parts(self) -> Parts:
         """Which of the sights, or the room, each pixel shows."""
-        return Parts(self.scene, [sight.figure.seen for sight in self.sights])
+        return Parts(self.scene, [sight.seen for sight in self.sights])
 
     @property
     def in_view(self) -> dict[Person, int]:
@@ -147,18 +146,17 @@ class Account:
     def unmoved(self) -> list[tuple[Person, Silhouette]]:
         """Those in view whom nobody chose and who have never walked, and where they are."""
         return [
-            (person, self.sights[index].figure.seen)
+            (person, self.sights[index].seen)
             for person, index in self.in_view.items()
             if not person.chosen and person.travelled < TRAVELLED
         ]
 
-    @property
-    def against_chosen(self) -> float:
+    def against_chosen(self, person: Person) -> float:
         """:attr:`against` of who was chosen: he is waited for, however many others come.
 
         What looks can say is bounded, so this is, too: else he would be somebody new for good.
         """
-        return min(self.against, SUREST_PART)
+        return min(self.against, SUREST_PART) * away(self.time - person.seen_at)
 
     def was_away(self, person: Person) -> bool:
         """Whether somebody has been absent for so long that his place says little."""
@@ -194,18 +192,18 @@ class Account:
     def figure_of(self, seen: Silhouette) -> int:
         """Index of the sight that a silhouette is, and not only a part of; -1 for none."""
         index = self.sight_of(seen)
-        if index >= 0 and seen.area < MOST * self.sights[index].figure.seen.area:
+        if index >= 0 and seen.area < MOST * self.sights[index].seen.area:
             return -1
         return index
 
     def look(self, seen: Silhouette) -> View:
         """The look of any silhouette of the frame."""
         for sight in self.sights:
-            if sight.figure.seen.same(seen):
+            if sight.seen.same(seen):
                 return sight.view
         view = look_of(self.scene, seen)
         index = self.sight_of(seen)
-        if index < 0 or self.sights[index].figure.parted:
+        if index < 0 or self.sights[index].parted:
             return view
         whole = self.sights[index].view  # a part of whom it describes, and who walks there
         return replace(
@@ -220,7 +218,7 @@ class Account:
 
     def _is_nearly(self, seen: Silhouette, index: int) -> bool:
         """Whether hardly anything of a sight is missing in a silhouette that is part of it."""
-        return index >= 0 and SAME < self.sights[index].figure.seen.area / seen.area < 1 / SAME
+        return index >= 0 and SAME < self.sights[index].seen.area / seen.area < 1 / SAME
 
     def claim(self, person: Person, seen: Silhouette) -> Claim:
         """What all that is known of the frame says of a silhouette being somebody known before."""
@@ -361,7 +359,7 @@ class Account:
 
         They may stand still for as long as they like.
         """
-        people = (self.sights[n].figure.seen for p, n in self.in_view.items() if p.alive)
+        people = (self.sights[n].seen for p, n in self.in_view.items() if p.alive)
         return together([*people, *targets], self.scene.view.shape)
 
 

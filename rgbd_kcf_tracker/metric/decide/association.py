@@ -64,8 +64,8 @@ def log_odds(
         starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
         best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
     rows = iter(best)
-    places = np.array([s.figure.place for s in sights])
-    low = np.array([not came(scene, s.figure.seen) for s in sights])
+    places = np.array([s.place for s in sights])
+    low = np.array([not came(scene, s.seen) for s in sights])
     for row, person in enumerate(people):
         likeness = next(rows) if person.gallery.looks is not None else None
         for column, sight in enumerate(sights):

@@ -134,7 +134,7 @@ class Crowd:
     def _chosen(self, account: Account, seen: Silhouette, since: float) -> Person:
         index = account.figure_of(seen)
         person = account.owner_of(index)
-        rest = [] if index < 0 else beside(account.scene, account.sights[index].figure.seen, seen)
+        rest = [] if index < 0 else beside(account.scene, account.sights[index].seen, seen)
         if person is not None and person.chosen and _is_beside(seen, person, account.time):
             # Three who touch may be two figures: the middle one, who was chosen, has half of each.
             other = self._claimed_at(account, seen, person)
@@ -213,7 +213,7 @@ class Crowd:
         person = self.welcome(place, left, chosen=True)
         person.gallery = gallery.copy()
         person.misses, person.figure = MISSES, True
-        person.area = max((view.total for view in gallery.views), default=0.0)
+        person.area = gallery.largest
         for other in self.people:
             if other.number in met:
                 other.meet(person)
@@ -292,7 +292,10 @@ class Crowd:
             boxes = [box_about(scene, figure.seen) for figure in figures]
             places = np.stack([figure.place for figure in figures])
             views = self._describer.everybody(views, boxes, places, time)
-        return [Sight(figure, view) for figure, view in zip(figures, views, strict=True)]
+        return [
+            Sight(each.seen, each.place, each.parted, each.low, view=view)
+            for each, view in zip(figures, views, strict=True)
+        ]
 
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float
@@ -383,17 +386,17 @@ class Crowd:
             if row == HELD:
                 account.owner[column] = -1
             elif row < 0:
-                small = sight.figure.seen.area < NEW_AREA and not _is_head(account, column)
-                if small or sight.figure.low or _is_piece(account, column):
+                small = sight.seen.area < NEW_AREA and not _is_head(account, column)
+                if small or sight.low or _is_piece(account, column):
                     continue
-                newcomer = self._welcome_as(account, sight.figure.seen, column)
-                newcomer.entered = sight.figure.seen.ends(account.scene.view, account.scene.rim).any
+                newcomer = self._welcome_as(account, sight.seen, column)
+                newcomer.entered = sight.seen.ends(account.scene.view, account.scene.rim).any
                 for other in people if account.scene.motion is None else ():
                     if other.seen_at < time and other.out_of_reach(newcomer.place, time):
                         other.meet(newcomer)
                 self._compare(account, len(people) - 1, column)
             elif people[row].number not in targets:
-                self._see(account, row, sight.figure.seen, column)
+                self._see(account, row, sight.seen, column)
         for person in people:
             if person.seen_at < time:
                 person.missed(account.scene.view.depth)
@@ -430,10 +433,10 @@ class Crowd:
         """Remember who was seen beside whom: they are surely not the same."""
         seen_now: list[tuple[Person, FloatArray]] = []
         for person, index in account.in_view.items():
-            figure = account.sights[index].figure
-            if person.number in targets or figure.parted or figure.seen.area <= WHOLE:
+            sight = account.sights[index]
+            if person.number in targets or sight.parted or sight.seen.area <= WHOLE:
                 continue
-            seen_now.append((person, figure.place))
+            seen_now.append((person, sight.place))
         for person in account.people:
             seen = targets.get(person.number)
             if seen is not None:
@@ -492,7 +495,7 @@ def _in_step(
     """A sight, and how tall who is there has walked of late; they are ``expected`` ``(n, 2)``."""
     walking_top = None
     if people:
-        off = np.hypot(*(expected - sight.figure.place).T)
+        off = np.hypot(*(expected - sight.place).T)
         nearest = int(off.argmin())
         if off[nearest] < STEP:
             walking_top = people[nearest].gallery.stature.walking_top(time)
@@ -510,7 +513,7 @@ def _followed(
         alike: for each of its people, ``(v, n, 2)``, see :func:`~.association.log_odds`.
     """
     here = [
-        Followed(account.people[row], sight.figure.place, sight.view, column, alike[row])
+        Followed(account.people[row], sight.place, sight.view, column, alike[row])
         for column, (row, sight) in enumerate(zip(account.owner, account.sights, strict=True))
         if row >= 0
     ]
@@ -524,20 +527,20 @@ def _followed(
 
 def _is_head(account: Account, column: int) -> bool:
     """Whether a sight that is small reaches up to where heads are, apart from all others."""
-    figure = account.sights[column].figure
-    top = account.scene.top(figure.seen)
+    sight = account.sights[column]
+    top = account.scene.top(sight.seen)
     if top is None or not HEAD_LEVEL < top < TOP[1]:
         return False
-    others = (s.figure.place for n, s in enumerate(account.sights) if n != column)
-    apart = all(np.hypot(*(figure.place - place)) > BESIDE for place in others)
-    return account.settled and not figure.parted and apart
+    others = (s.place for n, s in enumerate(account.sights) if n != column)
+    apart = all(np.hypot(*(sight.place - place)) > BESIDE for place in others)
+    return account.settled and not sight.parted and apart
 
 
 def _is_piece(account: Account, column: int) -> bool:
     """Whether a sight is where somebody else's is: a piece of him that has just come into view."""
-    place = account.sights[column].figure.place
+    place = account.sights[column].place
     return any(
-        row >= 0 and np.hypot(*(place - other.figure.place)) < TOGETHER
+        row >= 0 and np.hypot(*(place - other.place)) < TOGETHER
         for row, other in zip(account.owner, account.sights, strict=True)
     )
 

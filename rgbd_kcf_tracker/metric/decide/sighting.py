@@ -92,7 +92,7 @@ def learn_sighting(
         or (account.settled and person_sized(seen, view.top) and has_come(scene, seen))
         or upright(seen, scene.view.intrinsics, view.top)
     )
-    alone = index < 0 or not account.sights[index].figure.parted
+    alone = index < 0 or not account.sights[index].parted
     headed = not seen.cut.top or (seen.highest(scene.elevation) or 0.0) > HEADED
     # Where something nearer cuts somebody off, some of his pixels may be another's.
     apart = not (all_sides and (seen.cut.left or seen.cut.right))
