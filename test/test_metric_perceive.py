@@ -944,7 +944,7 @@ def test_who_stands_half_behind_another_is_not_joined_with_him():
     assert len(figures) == 2
     left, right = sorted(figures, key=lambda figure: figure.place[0])
     assert outline(left.seen).iou(people[0].box) > 0.9
-    assert not right.seen.ends(scene_of([]).view, Rim()).any
+    assert not right.seen.ends.any
     assert not left.parted
 
 

@@ -253,7 +253,7 @@ class BySurface:
 
     def _meet_neighbours(self, account: Account, found: Candidate) -> None:
         """Remember what else there is, beside a thing that was surely found and is not held."""
-        if self._neighbours is None or self.person.figure or self.person.area < SMALL:
+        if self._neighbours is None or self.person.area < SMALL:
             return
         beside = self._beside(account, found, self.candidates)
         self._neighbours.meet(each.placed for each in beside)
@@ -480,12 +480,12 @@ class BySurface:
         At the image's side a leg is the last that shows of who walks out: there he must have lain
         in the frame before.
         """
-        ends = seen.ends(scene.view, scene.rim)
-        return (self._lay or not (ends.left or ends.right)) and has_come(scene, seen)
+        beside = seen.ends.left or seen.ends.right
+        return (self._lay or not beside) and has_come(scene, seen)
 
     def _came_in(self, account: Account, seen: Silhouette) -> bool:
         """Whether a candidate is at the edge of what the camera sees, or came in there."""
-        if seen.ends(account.scene.view, account.scene.rim).any:
+        if seen.ends.any:
             return True
         stranger = account.stranger(self.person, account.sight_of(seen))
         return stranger is not None and stranger.entered

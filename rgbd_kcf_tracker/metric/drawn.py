@@ -70,7 +70,7 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
     mask &= (read == 0) | (np.abs(read - depth) < SAME_DEPTH * depth)
     if np.count_nonzero(mask) < LEAST_PIXELS:
         return None
-    seen = Silhouette(cols.start, rows.start, mask, 0, depth, 0.0, Sides(), (0.0,) * 4)
+    seen = Silhouette(cols.start, rows.start, mask, 0, depth, 0.0, Sides(), Sides(), (0.0,) * 4)
     return View.of(view, scene.codes, seen, None, max(-b.y, 0.0) * depth / k.fy)
 
 

@@ -370,8 +370,7 @@ def look_of(scene: Scene, seen: Silhouette) -> View:
     """
     highest, above = seen.highest(scene.elevation), 0.0
     top = None if seen.cut.top else highest
-    ends = seen.ends(scene.view, scene.rim)
-    upper = seen.mask[:UPPER]
+    ends, upper = seen.ends, seen.mask[:UPPER]
     beside = (ends.left and upper[:, 0].any()) or (ends.right and upper[:, -1].any())
     if ends.top or beside:
         top = None

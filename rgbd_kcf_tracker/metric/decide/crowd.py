@@ -390,7 +390,7 @@ class Crowd:
                 if small or sight.low or _is_piece(account, column):
                     continue
                 newcomer = self._welcome_as(account, sight.seen, column)
-                newcomer.entered = sight.seen.ends(account.scene.view, account.scene.rim).any
+                newcomer.entered = sight.seen.ends.any
                 for other in people if account.scene.motion is None else ():
                     if other.seen_at < time and other.out_of_reach(newcomer.place, time):
                         other.meet(newcomer)

@@ -100,7 +100,8 @@ class Silhouette:
         label: the surface that it is as a whole, 0 where it is part of one or of several.
         depth: mean depth in metres.
         area: in square metres, seen from the camera.
-        cut: the sides on which something nearer, or the end of the image, may hide more of it.
+        ends: the sides at which it reaches the end of what the camera sees.
+        cut: the sides on which something nearer, or that end, may hide more of it.
         metres: left, top, right and bottom in metres of the camera's frame, at ``depth``.
     """
 
@@ -110,12 +111,9 @@ class Silhouette:
     label: int
     depth: float
     area: float
+    ends: Sides
     cut: Sides
     metres: tuple[float, float, float, float]
-
-    def ends(self, view: DepthView, rim: Rim) -> Sides:
-        """At which sides it reaches the end of what the camera sees."""
-        return rim.reached(self.left, self.top, self.cols.stop, self.rows.stop, view)
 
     def pixels(self, image: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
         """Those of an image of the view's shape that it covers, ``(n,)``."""
@@ -204,7 +202,7 @@ class Silhouette:
         x0, y0, _ = view.metres(left, top, z)
         x1, y1, _ = view.metres(left + cols, top + rows, z)
         area = float(np.count_nonzero(mask)) * z * z / (k.fx * k.fy)
-        return cls(left, top, mask, label, z, area, cut, (x0, y0, x1, y1))
+        return cls(left, top, mask, label, z, area, ends, cut, (x0, y0, x1, y1))
 
     @classmethod
     def trimmed(

@@ -202,8 +202,7 @@ def upright_people(
                 if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
             ]
         for seen in found:
-            ends = seen.ends(view, rim)
-            if whole and (ends.left or ends.right):
+            if whole and (seen.ends.left or seen.ends.right):
                 continue
             people.append(seen)
             if one[label] and seen.height >= LENGTH[0]:
