@@ -166,7 +166,7 @@ class SceneReader:
         self.lately: Sequence[Lately] = ()
         self.last_view: DepthView | None = None
         self.stood_for = math.inf
-        self._unread = self._unpainted = 0.0
+        self._unread = 0.0
 
     def read(self, frame: Frame, seconds: float) -> Scene | None:
         """The scene of a frame ``seconds`` after the last, or None where it has no depth."""
@@ -181,7 +181,8 @@ class SceneReader:
         self.last_view = view
         if view.shape != self.room.depth.shape:
             self._rim, self._floors, self._level = None, FloorFinder(), None
-        learns, since = self._due(seconds)
+        unlearned, since = self._due(seconds)
+        learns = unlearned is not None
         image = view_image(frame.color, view.step)
         motion = way = self._move(image, view, frame.pose, seconds)
         if isinstance(way, Lost) and self.room.agrees(view.depth):
@@ -212,11 +213,9 @@ class SceneReader:
         self._see_room(view, surfaces, rim, upright, motion, seconds, learns, closer)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
-        self._unpainted += seconds
-        if learns:
+        if unlearned is not None:
             still = self.room.still if closer is None else self.room.still & ~closer
-            self._paint.learn(image, still, self._unpainted)
-            self._unpainted = 0.0
+            self._paint.learn(image, still, unlearned)
         return Scene(
             view=view,
             floor=floor,
@@ -272,8 +271,8 @@ class SceneReader:
             self._rim = Rim.of(view).common(self._rim)
         return self._rim or Rim()
 
-    def _due(self, seconds: float) -> tuple[bool, float | None]:
-        """Whether the room is learned from this frame, and :attr:`Scene.since`."""
+    def _due(self, seconds: float) -> tuple[float | None, float | None]:
+        """Seconds since the room, and since looks, were learned; None where neither is to be now."""
         self._learned += seconds
         self._taught += seconds
         moves = self.stood_for == 0.0
@@ -281,12 +280,13 @@ class SceneReader:
         learns = not fast or self._learned >= LEARNING_STEP
         # Where frames come fast, looks are learned from another one than the room: none takes long.
         teaches = not fast or (self._taught >= LEARNING_STEP and not learns)
+        unlearned = self._learned if learns else None
         since = self._taught if teaches else None
         if learns:
             self._learned = 0.0
         if teaches:
             self._taught = 0.0
-        return learns, since
+        return unlearned, since
 
     def _see_room(
         self,
