@@ -149,10 +149,7 @@ def of_metric(targets: MetricTargets, number: int) -> Insight:
     considered: list[Considered] = []
     for candidate, box in follower.weighed():
         share = evidence.WEIGHTS * candidate.evidence.features()
-        seen = candidate.seen
-        mask = np.zeros(scene.view.shape, bool)
-        rows, cols = seen.mask.shape
-        mask[seen.top : seen.top + rows, seen.left : seen.left + cols] = seen.mask
+        mask = candidate.seen.in_view(scene.view.shape)
         if any(
             _overlap(mask, other.mask) > ONE_THING or box.iou(other.box) > ONE_BOX
             for other in considered

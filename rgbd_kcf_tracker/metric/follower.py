@@ -459,10 +459,8 @@ class Follower:
             return self._hidden(frame, dt)
         if view is not None:
             surface.seen_elsewhere(view, look.box, self._dark.depth(frame, look.box))
-        known = self._unread_for + dt <= self._parameters.predict_for
-        belief = surface.belief() if known else None
         score = min(_score(look, 0.0), self._dark.most)
-        return self._told(frame, look.box, score, None, belief)
+        return self._told(frame, look.box, score, None, self._believed(self._unread_for + dt))
 
     def _glance(
         self,
@@ -498,9 +496,8 @@ class Follower:
                         surface.person.placed(place, account.time)
                     # What is not read is believed for as long as where who is hidden is.
                     unread = 0.0 if look.depth is not None else self._unread_for + dt
-                    known = unread <= self._parameters.predict_for
-                    belief = surface.belief() if known else None
-                    return self._told(frame, look.box, _score(look, stood), look.depth, belief)
+                    score, belief = _score(look, stood), self._believed(unread)
+                    return self._told(frame, look.box, score, look.depth, belief)
         surface.miss(scene, dt)
         return self._hidden(frame, dt)
 
@@ -591,10 +588,14 @@ class Follower:
         gone = self._hidden_for + dt
         return TrackState.LOST if gone > self._parameters.lost_after else TrackState.OCCLUDED
 
+    def _believed(self, untold: float) -> Belief | None:
+        """Where the target is believed to be for which nothing has told that for some seconds."""
+        if self._surface is None or untold > self._parameters.predict_for:
+            return None
+        return self._surface.belief()
+
     def _hidden(self, frame: Frame, dt: float) -> Track:
-        belief = None
-        if self._surface is not None and self._hidden_for + dt <= self._parameters.predict_for:
-            belief = self._surface.belief()
+        belief = self._believed(self._hidden_for + dt)
         return self._told(frame, None, 0.0, None, belief, self._unseen(dt))
 
     def _told(

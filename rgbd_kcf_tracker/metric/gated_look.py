@@ -30,7 +30,6 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
-from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.upright import TOP
 
 LOOK_OFF, LOOK_OFF_SHARE = 0.03, 0.15
@@ -290,11 +289,6 @@ class GatedLook:
         small = _area(account.scene.view, look) < SMALL
         return small and (look.stands_out or self._goes_on(account, look))
 
-    def _of_another(self, account: Account, whole: Silhouette) -> bool:
-        """Whether a figure is another target."""
-        owner = account.owner_of(account.sight_of(whole))
-        return owner is not None and owner.chosen
-
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.
 
@@ -327,16 +321,17 @@ class GatedLook:
         if look is None:
             self._agreed = 0
             return None
-        whole = whole_of(account, look.box)
-        if whole is not None and self._of_another(account, whole):
-            whole = None
-        if whole is not None and box_about(account.scene, whole).iou(look.box) > SAME_OUTLINE:
-            self._agreed += 1
-            if self._agreed >= RELOCK_FRAMES:
-                return look.box
-        else:
-            self._agreed = 0
-        return None
+        self._agreed = self._agreed + 1 if _agrees(account, look.box) else 0
+        return look.box if self._agreed >= RELOCK_FRAMES else None
+
+
+def _agrees(account: Account, box: Box) -> bool:
+    """Whether a box is that of a whole surface, which is no other target."""
+    whole = whole_of(account, box)
+    if whole is None or box_about(account.scene, whole).iou(box) <= SAME_OUTLINE:
+        return False
+    owner = account.owner_of(account.sight_of(whole))
+    return owner is None or not owner.chosen
 
 
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:

@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_PIXELS
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
+from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
 
 LEAST_SHARE = 0.06
 """Area of a proposed surface against the target's, at the least: about a head against all of a
@@ -80,22 +80,21 @@ def propose(
     if len(labels) > most:
         labels = labels[np.argsort(away[labels])[:most]]
     found = [scene.silhouette(int(label)) for label in labels]
-    found += _split(scene, body, expected, others, sizes)
+    found += _split(scene, body, expected, others)
     narrow = (_narrowed(scene, body, seen, expected, others) for seen in found)
     return found + [seen for seen in narrow if seen is not None]
 
 
-def _split(
-    scene: Scene, body: Body, expected: Expectation, others: Others, sizes: Sizes
-) -> list[Silhouette]:
+def _split(scene: Scene, body: Body, expected: Expectation, others: Others) -> list[Silhouette]:
     """Cut the expected target out of surfaces that are more than the target."""
     view = scene.view
     k = view.intrinsics
     x, y, z = expected.position.tolist()
     if z < 0.2:
         return []
-    large = sizes.area > TOO_LARGE * body.area
-    mixed = (sizes.area > body.area) & ~large
+    area = scene.sizes.area
+    large = area > TOO_LARGE * body.area
+    mixed = (area > body.area) & ~large
     mixed[0] = False
     for label in np.flatnonzero(mixed).tolist():
         large[label] = others.share(scene.silhouette(label)) > MIXED
