@@ -506,16 +506,18 @@ def test_who_is_hidden_behind_a_camera_that_turned_away_is_where_he_was():
 def placed(cut_bottom: bool) -> tuple[Body, np.ndarray]:
     depth = wall()
     depth[40:120, 100:130] = 2.0
-    codes = ColorCodes(np.zeros((160, 240, 3), np.uint8))
     view = view_of(depth)
     body = Body(Silhouette.of(view, 100, 40, depth[40:120, 100:130] == 2.0, 1, Rim()))
     bottom = 120
     if cut_bottom:
         depth[80:, 60:180] = 1.0
         bottom = 80
-    seen = Silhouette.of(view_of(depth), 100, 40, depth[40:bottom, 100:130] == 2.0, 1, Rim())
+    black = Frame(np.zeros((160, 240, 3), np.uint8), depth, 0, CAMERA)
+    scene = SceneReader(240, 0.04, 0.03, 0.0).read(black, 0.0)
+    assert scene is not None
+    seen = Silhouette.of(scene.view, 100, 40, depth[40:bottom, 100:130] == 2.0, 1, Rim())
     here = np.array([-0.05, -0.4, 2.0])
-    result = body.place(seen, codes, view_of(depth), here, np.full(3, 0.1))
+    result = body.place(seen, scene, here, np.full(3, 0.1))
     return body, np.array([*result.position, result.fraction])
 
 

@@ -134,7 +134,7 @@ class BySurface:
         self.body = Body(first)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
-        placed = self.body.place(first, scene.codes, scene.view, here, None)
+        placed = self.body.place(first, scene, here, None)
         self.motion = self._motion_from(placed)
         self._neighbours: Neighbours | None = Neighbours(parameters.speed, parameters.acceleration)
         self._middle = MiddleFilter()
@@ -151,7 +151,7 @@ class BySurface:
         self._lay = False
         self.contested = 0.0
         self.candidates: list[Candidate] = []
-        self.body.learn_colors(first, scene.codes, scene.view, float(placed.position[1]), None)
+        self.body.learn_colors(first, scene, float(placed.position[1]), None)
         self._learn_around(scene, first, None)
 
     # -- one frame --------------------------------------------------------------------------------
@@ -309,7 +309,7 @@ class BySurface:
         since = scene.since
         if sure and since is not None and not seen.cut.any and placed.fraction > LEARN_FRACTION:
             top = float(placed.position[1])
-            self.body.learn_colors(seen, scene.codes, scene.view, top, since)
+            self.body.learn_colors(seen, scene, top, since)
             self._learn_around(scene, seen, since)
             self.body.learn_size(seen, since)
         return self.box(scene, found)
@@ -429,7 +429,7 @@ class BySurface:
         claim = account.claim(self.person, seen)
         sigma = motion.sigma
         stands = not self.person.lies(scene.top(seen), account.time)
-        placed = body.place(seen, scene.codes, scene.view, motion.position, sigma, stands)
+        placed = body.place(seen, scene, motion.position, sigma, stands)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
         unsure = placed.sigma
@@ -500,7 +500,7 @@ class BySurface:
         y0 = int(min(max(top, 0), rows - 2))
         y1 = int(min(max(bottom, y0 + 1), rows))
         part = slice(y0, y1), slice(x0, x1)
-        self.body.learn_around(seen, scene.codes, scene.view, part, dt)
+        self.body.learn_around(seen, scene, part, dt)
 
     def box(self, scene: Scene, found: Candidate) -> Box:
         """The box that a candidate would give, in pixels of the image."""

@@ -43,10 +43,10 @@ def outline_box(scene: Scene, seen: Silhouette) -> Box:
     """
     body, top = Body(seen), seen.metres[1]
     if any(_at_rim(scene, seen)):
-        body.learn_colors(seen, scene.codes, scene.view, top, None)
+        body.learn_colors(seen, scene, top, None)
         wide = seen.mask.shape[1]
         about = seen.rows, slice(max(seen.left - wide, 0), seen.cols.stop + wide)
-        body.learn_around(seen, scene.codes, scene.view, about, None)
+        body.learn_around(seen, scene, about, None)
     return visible_box(scene, body, seen, top)
 
 

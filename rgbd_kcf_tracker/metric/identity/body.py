@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
-from rgbd_kcf_tracker.metric.perceive.colors import CODES, Codes, ColorCodes, smoothed
+from rgbd_kcf_tracker.metric.perceive.colors import CODES, Codes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 
 BANDS = 4
@@ -99,8 +100,7 @@ class Body:
     def place(
         self,
         seen: Silhouette,
-        codes: ColorCodes,
-        view: DepthView,
+        scene: Scene,
         expected: FloatArray,
         expected_sigma: FloatArray | None,
         stands: bool = True,
@@ -109,8 +109,7 @@ class Body:
 
         Args:
             seen: the silhouette.
-            codes: of the view's colours.
-            view: the depth.
+            scene: that it is of.
             expected: ``(3,)`` metres, where the body's reference point is expected.
             expected_sigma: ``(3,)`` metres, or None where nothing better than ``seen`` is known.
             stands: whether it may stand or sit, so that what is above it may be hidden.
@@ -124,8 +123,8 @@ class Body:
         if expected_sigma is not None and partly and expected_sigma[1] < 0.3:
             # The head may be hidden without a nearer surface beside it: see whether the colours
             # fit the parts lower down.
-            here = band_similarity(self._histograms(seen, codes, view, y), self._colors)
-            below = self._histograms(seen, codes, view, expected[1])
+            here = band_similarity(self._histograms(seen, scene, y), self._colors)
+            below = self._histograms(seen, scene, expected[1])
             if band_similarity(below, self._colors) > here:
                 y, y_sigma = float(expected[1]), y_sigma + 0.2 * self.height
         z_sigma = DEPTH_SIGMA + DEPTH_SIGMA_PER_METRE * z
@@ -165,11 +164,9 @@ class Body:
         _, row = view.place(0.0, top, seen.depth)
         return row - seen.top, self.height * view.intrinsics.fy / seen.depth
 
-    def _histograms(
-        self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float
-    ) -> Floats:
-        rows = self._rows(seen, view, top)
-        return band_histograms(codes[seen.rows, seen.cols], seen.mask, *rows)
+    def _histograms(self, seen: Silhouette, scene: Scene, top: float) -> Floats:
+        rows = self._rows(seen, scene.view, top)
+        return band_histograms(scene.codes[seen.rows, seen.cols], seen.mask, *rows)
 
     def odds_of(self, codes: Codes, seen: Silhouette, view: DepthView, top: float) -> Floats:
         """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
@@ -213,14 +210,12 @@ class Body:
         self.area *= max(1.0, factor)
         self._usual_area *= max(1.0, factor)
 
-    def learn_colors(
-        self, seen: Silhouette, codes: ColorCodes, view: DepthView, top: float, dt: float | None
-    ) -> None:
+    def learn_colors(self, seen: Silhouette, scene: Scene, top: float, dt: float | None) -> None:
         """Follow the colours of a silhouette, ``dt`` seconds since the last time, None at first.
 
         The body's upper edge is at ``top`` metres.
         """
-        counts = self._histograms(seen, codes, view, top)
+        counts = self._histograms(seen, scene, top)
         rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
         total = counts.sum(axis=1)
         rates = np.where(self._colors.sum(axis=1) == 0, 1.0, rate)
@@ -230,21 +225,16 @@ class Body:
         self._odds = None
 
     def learn_around(
-        self,
-        seen: Silhouette,
-        codes: ColorCodes,
-        view: DepthView,
-        part: tuple[slice, slice],
-        dt: float | None,
+        self, seen: Silhouette, scene: Scene, part: tuple[slice, slice], dt: float | None
     ) -> None:
         """Follow the colours of what stands beside a silhouette, in a part of the view about it.
 
         What has no reading is left out. It is ``dt`` seconds since the last time, None at first.
         """
-        beside = view.depth > 0
+        beside = scene.view.depth > 0
         beside[seen.rows, seen.cols] &= ~seen.mask
         rate = np.float32(0.7 if dt is None else 1 - np.exp(-dt / COLOR_TIME))
-        counts = np.bincount(codes[part][beside[part]], minlength=CODES).astype(np.float32)
+        counts = np.bincount(scene.codes[part][beside[part]], minlength=CODES).astype(np.float32)
         counts = smoothed(counts[None])[0]
         total = counts.sum()
         if total > 20:

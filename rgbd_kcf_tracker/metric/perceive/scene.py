@@ -272,7 +272,7 @@ class SceneReader:
         return self._rim or Rim()
 
     def _due(self, seconds: float) -> tuple[float | None, float | None]:
-        """Seconds since the room, and since looks, were learned; None where neither is to be now."""
+        """Seconds since the room, and looks, were last learned; None where not from this frame."""
         self._learned += seconds
         self._taught += seconds
         moves = self.stood_for == 0.0
