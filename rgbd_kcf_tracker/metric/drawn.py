@@ -56,7 +56,7 @@ def view_in(scene: Scene, box: Box, look: ByLook, depth: float | None = None) ->
     """
     view, k = scene.view, scene.view.intrinsics
     b = box.over(view.step)
-    rows, cols = part_in(view.shape, b)
+    rows, cols = view.part(box)
     tall = rows.stop - rows.start
     if tall < SLICES or b.y == 0:  # a box that ends where the image does was cut off there
         return None

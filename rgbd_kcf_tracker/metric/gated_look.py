@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -336,7 +336,7 @@ def _agrees(account: Account, box: Box) -> bool:
 
 def _part(scene: Scene, box: Box) -> tuple[slice, slice]:
     """Rows and columns of the view that the middle of a box covers."""
-    return part_in(scene.view.shape, box.scaled(MIDDLE).over(scene.view.step))
+    return scene.view.part(box.scaled(MIDDLE))
 
 
 def _tall(scene: Scene, box: Box, look: ByLook) -> bool:
@@ -356,7 +356,7 @@ def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] 
     """
     box, depth, spread = look.box, look.depth, 0.0
     if depth is None:
-        read = view.depth[part_in(view.shape, box.scaled(ABOUT).over(view.step))]
+        read = view.depth[view.part(box.scaled(ABOUT))]
         read = read[read > 0]
         if not read.size:
             return None

@@ -20,7 +20,6 @@ from rgbd_kcf_tracker.metric.decide.proposals import MOST_SHARE, propose
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_step
 from rgbd_kcf_tracker.metric.perceive.parting import BEHIND, BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -170,11 +169,7 @@ def _pieces_in(scene: Scene, box: Box, least: float) -> Silhouette | None:
         pieces = whole & (np.abs(surfaces.depth - z) < depth_step(z))
         if shown[pieces].sum() < enough:
             continue
-        boxes = surfaces.boxes[pieces]
-        left, top = boxes[:, :2].min(axis=0).tolist()
-        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0).tolist()
-        mask = pieces[surfaces.labels[top:bottom, left:right]]
-        seen = Silhouette.trimmed(scene.view, left, top, mask, scene.rim)
+        seen = Silhouette.trimmed(scene.view, *surfaces.crop_of(pieces), scene.rim)
         if seen is None or seen.width * seen.height < SMALL:
             continue
         outline = box_about(scene, seen)
@@ -193,7 +188,7 @@ def _of_background(scene: Scene, seen: Silhouette, box: Box) -> bool:
     """
     if _through_an_opening(scene, seen, box):
         return True
-    middle = part_in(scene.view.shape, box.scaled(0.5).over(scene.view.step))
+    middle = scene.view.part(box.scaled(0.5))
     depth = scene.view.depth[middle]
     own = np.count_nonzero(seen.in_view(scene.view.shape)[middle])
     if np.count_nonzero(depth == 0) > MOSTLY * depth.size:
@@ -223,7 +218,7 @@ def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
     shown[0] = 0
     label = int(np.argmax(shown))
     large = scene.surfaces.pixels[label] > MOST_SHARE * total
-    read = np.count_nonzero(scene.view.depth[part_in(scene.view.shape, box.over(scene.view.step))])
+    read = np.count_nonzero(scene.view.depth[scene.view.part(box)])
     if large or shown[label] < max(1.0, LEAST_FILL * read):
         return None
     part = _within(scene, scene.silhouette(label), box)
@@ -240,7 +235,7 @@ def _one_of_two(scene: Scene, piece: Silhouette, box: Box) -> bool:
     whole = scene.silhouette(int(scene.surfaces.labels[own][0]))
     if whole.width < BROAD or piece.height < UPRIGHT or not beside(scene, whole, piece):
         return False
-    part = part_in(scene.view.shape, box.over(scene.view.step))
+    part = scene.view.part(box)
     labels = scene.surfaces.labels[part]
     farther = scene.view.depth[part] > piece.depth + DEPTH_STEP
     farther &= (labels > 0) & ~scene.large[labels] & ~own[part]
@@ -281,7 +276,7 @@ def _found_again(account: Account, piece: Silhouette, parameters: MetricParamete
 
 def _shown(scene: Scene, box: Box) -> npt.NDArray[np.intp]:
     """``(k,)`` how many pixels of each surface a box shows."""
-    labels = scene.surfaces.labels[part_in(scene.view.shape, box.over(scene.view.step))]
+    labels = scene.surfaces.labels[scene.view.part(box)]
     return np.bincount(labels.ravel(), minlength=len(scene.surfaces))
 
 
@@ -313,7 +308,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
 
     They stand before the room at about one depth, and belong to nothing that goes on beside it.
     """
-    part = rows, cols = part_in(scene.view.shape, box.over(scene.view.step))
+    part = rows, cols = scene.view.part(box)
     mine = scene.standing[part].copy()
     labels = scene.surfaces.labels[part]
     inside = np.bincount(labels[mine], minlength=len(scene.surfaces))
@@ -381,7 +376,7 @@ def _in_the_middle(scene: Scene, seen: Silhouette, box: Box) -> bool:
     That is who is half hidden behind him, or who stands before him as much in the box as he does;
     and of whom there is no reading. A wall behind him is not, nor is who comes in from the side.
     """
-    middle = part_in(scene.view.shape, box.scaled(0.5).over(scene.view.step))
+    middle = scene.view.part(box.scaled(0.5))
     own = seen.in_view(scene.view.shape)[middle]
     depth, labels = scene.view.depth[middle], scene.surfaces.labels[middle]
     beyond = depth > seen.depth + DEPTH_STEP
@@ -402,9 +397,9 @@ def _within(scene: Scene, seen: Silhouette, box: Box) -> Silhouette:
     """
     view = scene.view
     mask = seen.in_view(view.shape)
-    rows, cols = part_in(view.shape, box.scaled(1 + 2 * OUTSIDE).over(view.step))
+    rows, cols = view.part(box.scaled(1 + 2 * OUTSIDE))
     if np.count_nonzero(mask[rows, cols]) == np.count_nonzero(seen.mask):
         return seen
     if seen.label > 0 and scene.large[seen.label]:
-        rows, cols = part_in(view.shape, box.over(view.step))
+        rows, cols = view.part(box)
     return Silhouette.trimmed(view, cols.start, rows.start, mask[rows, cols], scene.rim) or seen

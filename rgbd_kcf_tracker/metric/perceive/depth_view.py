@@ -112,6 +112,10 @@ class DepthView:
             return self
         return DepthView(np.zeros((rows, cols), np.float32), step, intrinsics)
 
+    def part(self, box: Box) -> tuple[slice, slice]:
+        """Rows and columns of the view that a box of the image touches."""
+        return part_in(self.shape, box.over(self.step))
+
     def metres(self, across: float, down: float, depth: float) -> tuple[float, float, float]:
         """Where a place of the view is, in metres of the camera's frame.
 

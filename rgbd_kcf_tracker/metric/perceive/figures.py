@@ -104,14 +104,10 @@ def find_figures(scene: Scene, expected: FloatArray, chosen: int = 0) -> list[Fi
     if scene.elevation is not None:
         above = pieces.means(scene.elevation[part])
     for members in _joined(scene, pieces, pieces.means(scene.forward[part]), above):
-        boxes = pieces.boxes[members]
-        left, top = int(boxes[:, 0].min()), int(boxes[:, 1].min())
-        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0)
-        crop = pieces.labels[top:bottom, left:right]
         member = np.zeros(len(pieces), np.bool_)
         member[members] = True
-        left, top, whole = part[1].start + left, part[0].start + top, member[crop]
-        parts = [whole]
+        left, top, whole = pieces.crop_of(member)
+        left, top, parts = x + left, y + top, [whole]
         if not _has_lain_down(scene, left, top, whole):
             parts = parted(
                 scene.view, scene.forward, scene.axes[0], left, top, whole, expected, chosen

@@ -53,6 +53,13 @@ class Surfaces:
         left, top, width, height = self.boxes[label].tolist()
         return left, top, self.labels[top : top + height, left : left + width] == label
 
+    def crop_of(self, those: Mask) -> tuple[int, int, Mask]:
+        """The same of all of some surfaces, ``(n,)`` bool, one at the least."""
+        boxes = self.boxes[those]
+        left, top = boxes[:, :2].min(axis=0).tolist()
+        right, bottom = (boxes[:, :2] + boxes[:, 2:]).max(axis=0).tolist()
+        return left, top, those[self.labels[top:bottom, left:right]]
+
     def means(self, values: Floats) -> FloatArray:
         """Mean over each surface of an image, ``(h, w)``; ``(n,)``, 0 where there is no pixel."""
         return _means(values, self.labels, self.runs, self.pixels)
