@@ -218,8 +218,7 @@ class ByLook:
                 return None
             self._hidden = False
             return look
-        stands_out = self._stands_out(frame, sighting)
-        look = dataclasses.replace(self._found(frame, sighting, dt), stands_out=stands_out)
+        look = self._found(frame, sighting, dt, self._stands_out(frame, sighting))
         return self._outlined(frame, look, dt)
 
     def take(self, frame: Frame, look: Look, dt: float) -> None:
@@ -491,12 +490,12 @@ class ByLook:
             ] = -np.inf
         return best
 
-    def _found(self, frame: Frame, sighting: Sighting, dt: float) -> Look:
+    def _found(self, frame: Frame, sighting: Sighting, dt: float, stands_out: bool = False) -> Look:
         self._cx = float(np.clip(sighting.cx, 0, frame.width))
         self._cy = float(np.clip(sighting.cy, 0, frame.height))
         depth = depth_in(frame, self._box)
         self._rescale(frame, depth, sighting, dt)
-        return Look(self._box, sighting.ratio, sighting.peak, depth)
+        return Look(self._box, sighting.ratio, sighting.peak, depth, stands_out=stands_out)
 
     def _moving(self, frame: Frame) -> Look | None:
         """The target by what moves where it was: something hides a part of it, or it has turned."""

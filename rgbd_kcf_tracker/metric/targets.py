@@ -231,6 +231,11 @@ class MetricTargets:
             return before
         return self.account
 
+    @property
+    def _chosen(self) -> dict[int, Follower]:
+        """Who follows whom: by the numbers of those of whom it is known who they are."""
+        return {f.person.number: f for f in self._followers.values() if f.person is not None}
+
     def _in_other_metres(self, frame: Frame) -> bool:
         """Whether the camera turns out to be another than was taken so far, and all are seen.
 
@@ -331,14 +336,9 @@ class MetricTargets:
         if self.account is None or not self._unlearned:
             return
         self._unlearned = False
-        targets = {
-            f.person.number: f.seen for f in self._followers.values() if f.person is not None
-        }
-        unsure = {
-            f.person.number
-            for f in self._followers.values()
-            if f.person is not None and f.track.score < LEARNED
-        }
+        chosen = self._chosen
+        targets = {number: each.seen for number, each in chosen.items()}
+        unsure = {number for number, each in chosen.items() if each.track.score < LEARNED}
         self._crowd.learn(self.account, targets, unsure)
         surely = [
             each for number, each in targets.items() if each is not None and number not in unsure
@@ -396,7 +396,7 @@ class MetricTargets:
 
     def _others(self, frame: Frame) -> dict[int, Track]:
         """Tracks of those whom nobody chose, as far as they are in view or were a moment ago."""
-        chosen = {f.person.number for f in self._followers.values() if f.person is not None}
+        chosen = set(self._chosen)
         numbers = {person.number for person in self._crowd.people}
         self._names = {n: name for n, name in self._names.items() if n in numbers}
         tracks = {} if self.account is None else self._in_view(frame, self.account, chosen)

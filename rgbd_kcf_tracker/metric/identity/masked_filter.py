@@ -19,7 +19,6 @@ from scipy import fft
 from rgbd_kcf_tracker.arrays import Floats
 from rgbd_kcf_tracker.features.labels import gaussian_labels
 
-Features = npt.NDArray[np.float32]
 Spectrum = npt.NDArray[np.complex64]
 
 PENALTY = 5.0
@@ -35,7 +34,7 @@ SPARSITY = 0.01
 does not tell small."""
 
 
-def spectrum_of(features: Features) -> Spectrum:
+def spectrum_of(features: Floats) -> Spectrum:
     """What the filter reads of windowed features, ``(channels, size, size)``."""
     spectrum: Spectrum = fft.rfft2(features)
     return spectrum

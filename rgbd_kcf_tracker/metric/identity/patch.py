@@ -7,12 +7,9 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from rgbd_kcf_tracker.arrays import Image
+from rgbd_kcf_tracker.arrays import Floats, Image
 from rgbd_kcf_tracker.features.hog import CELL_SIZE, HogExtractor
-
-Features = npt.NDArray[np.float32]
 
 COLOR_WEIGHT = 0.4
 """Most that a colour channel can be: as much as one of the orientations, which are half the sum of
@@ -40,7 +37,7 @@ class PatchFeatures:
         self._window = np.outer(line, line).astype(np.float32)
         self._chroma = np.tanh((np.arange(256) - 128.0) * CHROMA_SLOPE).astype(np.float32)
 
-    def __call__(self, window: Image) -> Features:
+    def __call__(self, window: Image) -> Floats:
         """The features of a ``(pixels, pixels, 3)`` window, ``(31 + 5, cells, cells)`` float32.
 
         31 channels of fHOG; lightness, and the positive and negative parts of the two chroma axes
