@@ -122,7 +122,7 @@ class Follower:
         crowd: Crowd,
         box: Box,
         parameters: MetricParameters,
-        cues: Sequence[Cue] = (),
+        cues: Sequence[Cue],
     ) -> None:
         self._parameters, self._cues = parameters, cues
         self._crowd = crowd

@@ -105,7 +105,7 @@ class GatedLook:
             self._mobile = account.settled and room_share(account, box) < 1 - IS_ROOM
             part = _part(account.scene, box)
             self._began = part, account.scene.view.depth[part].copy()
-            at = _place(account.scene.view, Look(box, 1.0, 0.0, look.last_depth))
+            at = _place(account.scene.view, box, look.last_depth)
             if look.last_depth is not None and at is not None:
                 self.stood, self._at = Stood(*at), at[0]
 
@@ -141,7 +141,7 @@ class GatedLook:
             look = None
         if look is not None:
             self._look.take(frame, look, dt)
-            at = None if account is None else _place(account.scene.view, look)
+            at = None if account is None else _place(account.scene.view, look.box, look.depth)
             self._at = None if at is None else at[0]
             if at is not None:
                 place, sigma, width = at
@@ -233,12 +233,12 @@ class GatedLook:
         expected = self._expected(account)
         if expected is None or look.depth is None or look.box.intersection(expected) == 0:
             return False
-        at = _place(account.scene.view, look)
+        at = _place(account.scene.view, look.box, look.depth)
         return self.stood is not None and at is not None and self.stood.log_odds(*at[:2]) > 0
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
-        at = _place(account.scene.view, look)
+        at = _place(account.scene.view, look.box, look.depth)
         followed = self._unseen == 0 and self._near_last(look.box)
         if self.stood is None or followed or at is None:
             return False
@@ -348,13 +348,15 @@ def _tall(scene: Scene, box: Box, look: ByLook) -> bool:
     return TOP[0] < tall < TOP[1]
 
 
-def _place(view: DepthView, look: Look) -> tuple[FloatArray, FloatArray, float] | None:
+def _place(
+    view: DepthView, box: Box, depth: float | None
+) -> tuple[FloatArray, FloatArray, float] | None:
     """Where the middle of what was found is, ``(3,)`` metres, how surely, and its width there.
 
     What has no reading itself is about as deep as what is read beside it, as far as that agrees.
     None where nothing is.
     """
-    box, depth, spread = look.box, look.depth, 0.0
+    spread = 0.0
     if depth is None:
         read = view.depth[view.part(box.scaled(ABOUT))]
         read = read[read > 0]

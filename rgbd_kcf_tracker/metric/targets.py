@@ -454,20 +454,14 @@ class MetricTracker:
     Args:
         parameters: see :class:`MetricParameters`.
         cues: further ones for the verdict.
-        embedding: see :class:`MetricTargets`.
 
     Raises:
-        ParameterError: likewise.
+        ParameterError: see :class:`MetricTargets`.
     """
 
-    def __init__(
-        self,
-        parameters: MetricParameters,
-        cues: Sequence[Cue] = (),
-        embedding: Embedding | None = None,
-    ) -> None:
+    def __init__(self, parameters: MetricParameters, cues: Sequence[Cue] = ()) -> None:
         self._parameters, self._cues = parameters, cues
-        self._embedding = _network_of(parameters) if embedding is None else embedding
+        self._embedding = _network_of(parameters)
         self._targets: MetricTargets | None = None
         self._number = 0
 
