@@ -52,8 +52,8 @@ class MaskedFilter:
         self.size = size
         labels = gaussian_labels((size, size), sigma, np.float32)
         self._label = np.conj(fft.rfft2(labels)).astype(np.complex64)
-        self._filter: Spectrum | None = None
-        self._weights: Floats | None = None
+        self._filter: Spectrum = np.zeros(1, np.complex64)
+        self._weights: Floats = np.zeros(1, np.float32)
 
     def _solved(self, spectrum: Spectrum, mask: Floats) -> Spectrum:
         shape = (self.size, self.size)
@@ -89,12 +89,9 @@ class MaskedFilter:
         response = fft.irfft2(np.conj(solved) * spectrum, s=(self.size, self.size))
         weights = np.maximum(response.reshape(len(response), -1).max(axis=1), 0)
         weights /= max(float(weights.sum()), 1e-9)
-        if self._filter is None or self._weights is None:
-            self._filter, self._weights = solved, weights
-        else:
-            r = np.float32(rate)
-            self._filter = (1 - r) * self._filter + r * solved
-            self._weights = (1 - r) * self._weights + r * weights
+        r = np.float32(rate)
+        self._filter = (1 - r) * self._filter + r * solved
+        self._weights = (1 - r) * self._weights + r * weights
 
     def response(self, spectrum: Spectrum) -> Floats:
         """How much each shift of the window looks like the target, ``(size, size)``, cyclic.
@@ -104,8 +101,6 @@ class MaskedFilter:
         Args:
             spectrum: as for :meth:`learn`.
         """
-        assert self._filter is not None, 'learn first'
-        assert self._weights is not None, 'learn first'
         product = np.einsum('chw,c->hw', np.conj(self._filter) * spectrum, self._weights)
         result: Floats = fft.irfft2(product, s=(self.size, self.size))
         return result

@@ -50,8 +50,8 @@ class ScaleFilter:
         label = gaussian_labels((COUNT,), 0.25 * np.sqrt(COUNT))
         self._label = np.conj(fft.rfft(label)).astype(np.complex64)
         self._window = np.hanning(COUNT + 2)[1:-1].astype(np.float32)
-        self._numerator: npt.NDArray[np.complex64] | None = None
-        self._denominator: Floats | None = None
+        self._numerator: npt.NDArray[np.complex64] = np.zeros(1, np.complex64)
+        self._denominator: Floats = np.zeros(1, np.float32)
 
     def _spectrum(
         self, color: Image, cx: float, cy: float, width: float, height: float
@@ -85,21 +85,18 @@ class ScaleFilter:
     def learn(
         self, color: Image, cx: float, cy: float, width: float, height: float, rate: float
     ) -> None:
-        """Take one sample of the target, centred at ``cx, cy`` with that size in pixels."""
+        """Take one sample of the target, centred at ``cx, cy`` with that size in pixels.
+
+        ``rate`` is its share in what is remembered, 1 for the first.
+        """
         spectrum = self._spectrum(color, cx, cy, width, height)
-        numerator = self._label * spectrum
-        denominator = (spectrum.real**2 + spectrum.imag**2).sum(axis=0)
-        if self._numerator is None or self._denominator is None:
-            self._numerator, self._denominator = numerator, denominator
-            return
+        energy = (spectrum.real**2 + spectrum.imag**2).sum(axis=0)
         r = np.float32(rate)
-        self._numerator += r * (numerator - self._numerator)
-        self._denominator += r * (denominator - self._denominator)
+        self._numerator = self._numerator + r * (self._label * spectrum - self._numerator)
+        self._denominator = self._denominator + r * (energy - self._denominator)
 
     def factor(self, color: Image, cx: float, cy: float, width: float, height: float) -> float:
         """By how much the target's size has changed from ``width`` x ``height``."""
-        assert self._numerator is not None, 'learn first'
-        assert self._denominator is not None, 'learn first'
         spectrum = self._spectrum(color, cx, cy, width, height)
         match = (np.conj(self._numerator) * spectrum).sum(axis=0)
         response = fft.irfft(match / (self._denominator + REGULARIZATION), n=COUNT)
