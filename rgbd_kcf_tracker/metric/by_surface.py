@@ -134,7 +134,7 @@ class BySurface:
         self.body = Body(first)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
-        placed = self.body.place(first, scene, here, None)
+        placed = self.body.place(first, scene, here, np.full(3, FIRST_SIGMA))
         self.motion = self._motion_from(placed)
         self._neighbours: Neighbours | None = Neighbours(parameters.speed, parameters.acceleration)
         self._middle = MiddleFilter()
@@ -151,7 +151,7 @@ class BySurface:
         self._lay = False
         self.contested = 0.0
         self.candidates: list[Candidate] = []
-        self.body.learn_colors(first, scene, float(placed.position[1]), None)
+        self.body.learn_colors(first, scene, float(placed.position[1]), 0.0)
         self._learn_around(scene, first, None)
 
     # -- one frame --------------------------------------------------------------------------------

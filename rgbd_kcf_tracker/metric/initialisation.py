@@ -358,10 +358,10 @@ def _people(account: Account, box: Box) -> Iterator[Silhouette]:
     """What has the shape of a person; or the size, of what the image's ends cut off."""
     scene = account.scene
     for index, sight in enumerate(account.sights):
-        seen, owner = sight.seen, account.owner_of(index)
+        owner = account.owner_of(index)
         known = owner is not None and owner.upright
-        if known or upright(seen, scene.view.intrinsics, account.look(seen).top):
-            yield seen
+        if known or upright(sight.seen, scene.view.intrinsics, sight.view.top):
+            yield sight.seen
     for label in np.flatnonzero(_overlaps_of(scene, box) > SIZE_IOU).tolist():
         seen = scene.silhouette(label)
         top = account.look(seen).top

@@ -43,7 +43,7 @@ def outline_box(scene: Scene, seen: Silhouette) -> Box:
     """
     body, top = Body(seen), seen.metres[1]
     if any(_at_rim(scene, seen)):
-        body.learn_colors(seen, scene, top, None)
+        body.learn_colors(seen, scene, top, 0.0)
         wide = seen.mask.shape[1]
         about = seen.rows, slice(max(seen.left - wide, 0), seen.cols.stop + wide)
         body.learn_around(seen, scene, about, None)

@@ -102,7 +102,7 @@ class Body:
         seen: Silhouette,
         scene: Scene,
         expected: FloatArray,
-        expected_sigma: FloatArray | None,
+        expected_sigma: FloatArray,
         stands: bool = True,
     ) -> Placed:
         """Take a silhouette as the visible part of the body.
@@ -111,7 +111,7 @@ class Body:
             seen: the silhouette.
             scene: that it is of.
             expected: ``(3,)`` metres, where the body's reference point is expected.
-            expected_sigma: ``(3,)`` metres, or None where nothing better than ``seen`` is known.
+            expected_sigma: ``(3,)`` metres, its deviation.
             stands: whether it may stand or sit, so that what is above it may be hidden.
         """
         x, x_sigma = self._across(seen, expected[0])
@@ -120,7 +120,7 @@ class Body:
         fraction = self._fraction(seen)
         lower = y - expected[1] > 0.08 * self.height
         partly = lower and fraction < 0.8 and stands
-        if expected_sigma is not None and partly and expected_sigma[1] < 0.3:
+        if partly and expected_sigma[1] < 0.3:
             # The head may be hidden without a nearer surface beside it: see whether the colours
             # fit the parts lower down.
             here = band_similarity(self._histograms(seen, scene, y), self._colors)
@@ -210,13 +210,14 @@ class Body:
         self.area *= max(1.0, factor)
         self._usual_area *= max(1.0, factor)
 
-    def learn_colors(self, seen: Silhouette, scene: Scene, top: float, dt: float | None) -> None:
-        """Follow the colours of a silhouette, ``dt`` seconds since the last time, None at first.
+    def learn_colors(self, seen: Silhouette, scene: Scene, top: float, dt: float) -> None:
+        """Follow the colours of a silhouette, ``dt`` seconds since the last time.
 
-        The body's upper edge is at ``top`` metres.
+        Those of a band that was not seen before are taken as they are. The body's upper edge is at
+        ``top`` metres.
         """
         counts = self._histograms(seen, scene, top)
-        rate = 1.0 if dt is None else 1 - float(np.exp(-dt / COLOR_TIME))
+        rate = 1 - float(np.exp(-dt / COLOR_TIME))
         total = counts.sum(axis=1)
         rates = np.where(self._colors.sum(axis=1) == 0, 1.0, rate)
         rates[total <= 8] = 0.0
