@@ -153,10 +153,9 @@ class Follower:
             elif account is not None:
                 self._know_as_drawn(account, box, self._look)
         depth = None if self.seen is None else self.seen.depth
-        belief = None if self._surface is None else self._surface.belief()
-        if account is not None and depth is not None:
+        if depth is not None:
             self._dark.seen(frame, box, depth, 1.0)
-        self.first = self.track = self._told(frame, box, 1.0, depth, belief)
+        self.first = self.track = self._told(frame, box, 1.0, depth, self._believed(0.0))
 
     def weighed(self) -> list[tuple[Candidate, Box]]:
         """What was weighed in the last frame, best first, and the box each would have given.
@@ -300,7 +299,8 @@ class Follower:
         whole = self._whole(account, surface.person, found.seen)
         whole = whole or self._as_drawn(account, found.seen)
         if whole is not None:
-            return self._locked(frame, account, self._anew(account, surface.person, whole), score)
+            self._anew(account, surface.person, whole)
+            return self._locked(frame, account, score)
         box = surface.take(account, found, score >= LEARNED)
         self.seen = found.seen
         self._shown = max(self._shown, found.seen.area)
@@ -432,13 +432,12 @@ class Follower:
                 return sight.seen
         return None
 
-    def _anew(self, account: Account, person: Person, whole: Silhouette) -> BySurface:
+    def _anew(self, account: Account, person: Person, whole: Silhouette) -> None:
         """Follow what somebody turned out to be as if it had been chosen now."""
         person.gallery = Gallery()
         self._surface = BySurface(account, whole, person, self._parameters, self._cues)
         self._partial, self._shown = whole.cut.any, whole.area
         self.seen = whole
-        return self._surface
 
     def _in_the_dark(
         self, frame: Frame, view: DepthView | None, dt: float, turn: bool, surface: BySurface
@@ -528,25 +527,25 @@ class Follower:
         if account is not None and said.onto is not None:
             self._lock(frame, account, said.onto, self._gated.stood)
             if self._surface is not None:
-                return self._locked(frame, account, self._surface, NEW_SCORE)
+                return self._locked(frame, account, NEW_SCORE)
         if account is not None and said.look is None and self._gated.lost_for > 0:
             known = self._known_by_box(account, self._gated)
             if known is not None:
                 seen, score = known
                 self._lock(frame, account, box_about(account.scene, seen))
                 if self._surface is not None:
-                    return self._locked(frame, account, self._surface, score)
+                    return self._locked(frame, account, score)
         if said.look is None:
             return self._hidden(frame, dt)
         score = _score(said.look, said.stood)
         return self._told(frame, said.look.box, score, said.look.depth)
 
-    def _locked(self, frame: Frame, account: Account, surface: BySurface, score: float) -> Track:
+    def _locked(self, frame: Frame, account: Account, score: float) -> Track:
         """The track of the frame from which on the target is followed by its surface."""
         assert self.seen is not None
         box = outline_box(account.scene, self.seen)
         self._dark.seen(frame, box, self.seen.depth, score)
-        return self._told(frame, box, score, self.seen.depth, surface.belief())
+        return self._told(frame, box, score, self.seen.depth, self._believed(0.0))
 
     def _known_by_box(self, account: Account, gated: GatedLook) -> tuple[Silhouette, float] | None:
         """Who has come and looks as what was drawn did, and how surely it is he."""
