@@ -63,7 +63,7 @@ class Newcomers:
         self._since, self._height, self._about = since, box.height, about
         self._pixels = None if account is None else _pixels(account.scene)
         self.beside: set[int] = set()
-        self._ends: Sides | None = None if account is None else account.scene.ends(box)
+        self._ends = Sides() if account is None else account.scene.ends(box)
 
     def was_there(self, person: Person) -> bool:
         """Whether somebody was there before the target was chosen, and is not the target."""
@@ -116,11 +116,8 @@ class Newcomers:
                 continue
             seen, scene = sight.seen, account.scene
             outline = box_about(scene, seen)
-            ends = scene.ends(outline)
-            shown, least = _to_side(outline, ends, scene), outline.area
-            in_part = self._ends is not None and (
-                (ends.left and self._ends.left) or (ends.right and self._ends.right)
-            )
+            shown, least = _to_side(outline, seen.ends, scene), outline.area
+            in_part = (seen.ends.left and self._ends.left) or (seen.ends.right and self._ends.right)
             # Of who was too far off to be read, perhaps a part was chosen, and the look does not
             # tell how large he gets as he comes nearer.
             if found is not None and look.unread and as_near(found.depth, seen.depth):

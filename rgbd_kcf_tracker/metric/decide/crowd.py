@@ -184,9 +184,8 @@ class Crowd:
 
     def _welcome_beside(self, account: Account, person: Person, beside: list[Silhouette]) -> None:
         for piece in beside:
-            if self._new_at(account, piece, person) is not None:
-                continue
-            self._welcome_as(account, piece, -1).meet(person)
+            if self._new_at(account, piece, person) is None:
+                self._welcome_as(account, piece, -1).meet(person)
 
     def _welcome_as(
         self, account: Account, seen: Silhouette, index: int, chosen: bool = False
@@ -263,7 +262,7 @@ class Crowd:
         account, alike = self._explained(scene, sights, time)
         mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
         if mixed_up is not None:
-            self._exchange(mixed_up.first, mixed_up.second, mixed_up.since)
+            self._exchange(*mixed_up)
             account, _ = self._explained(scene, sights, time)
         for column, row in enumerate(account.owner):
             if row >= 0:
@@ -366,9 +365,7 @@ class Crowd:
         for row, person in enumerate(people):
             if person.number not in targets:
                 continue
-            for column, owner in enumerate(account.owner):
-                if owner == row:
-                    account.owner[column] = HELD
+            account.owner = [HELD if owner == row else owner for owner in account.owner]
             seen = targets[person.number]
             if seen is None:
                 continue
