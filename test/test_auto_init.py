@@ -18,9 +18,9 @@ from rgbd_kcf_tracker.bench import auto_init as bench
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample
 from rgbd_kcf_tracker.live.auto_init import AutoInit
 from rgbd_kcf_tracker.live.settings import NodeParameters
-from rgbd_kcf_tracker.metric.people import rounded
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import rounded
 from rgbd_kcf_tracker.recordings import SequenceWriter
 
 SETTINGS = NodeParameters(auto_init=True)

@@ -11,16 +11,14 @@ never stands before the room. Where that is not sure there is nobody yet.
 
 from __future__ import annotations
 
-import numpy as np
-
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.account import Sight
 from rgbd_kcf_tracker.metric.decide.visible_box import outline_box
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import rounded
 from rgbd_kcf_tracker.metric.targets import MetricTargets
 
 SIGHTINGS = 2
@@ -33,12 +31,6 @@ ASPECT = 1.15
 """Height against width, at the least."""
 FILL = (0.3, 0.8)
 """Share of the box that a body fills; a box or a cupboard fills more, a rack less."""
-OFF_PLANE, OFF_PLANE_PER_SQUARE_METRE = 0.01, 0.001
-"""Metres by which a body's surface lies off a plane, in the median of its pixels: twice what a
-pushed box shows, and beyond the noise of a structured-light camera, of which two thirds of a
-deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
-FITS, PIXELS, OUTLIER = 3, 600, 4.0
-"""Rounds of fitting the plane, pixels for it, and medians beyond which one is not fitted to."""
 
 
 class PersonFinder:
@@ -83,22 +75,3 @@ def whole(scene: Scene, sight: Sight) -> bool:
     if top is not None and top < LEAST_TOP:
         return False
     return FILL[0] < seen.area / (seen.width * seen.height) < FILL[1]
-
-
-def rounded(view: DepthView, seen: Silhouette) -> bool:
-    """Whether a silhouette's surface is no plane, as a body's is not and a picture's is."""
-    rows, cols = np.nonzero(seen.mask)
-    some = slice(None, None, max(1, len(rows) // PIXELS))
-    rows, cols = rows[some], cols[some]
-    z = view.depth[seen.rows, seen.cols][rows, cols].astype(np.float64)
-    pixels = np.stack((cols, rows, np.ones(len(z))), axis=1)
-    fitted = np.ones(len(z), np.bool_)
-    off = z
-    for _ in range(FITS):
-        # Along a plane the inverse of depth is affine in the pixel; weighted, to fit in metres.
-        plane, *_ = np.linalg.lstsq(
-            pixels[fitted] * z[fitted, None], np.ones(fitted.sum()), rcond=None
-        )
-        off = np.abs(1 - z * (pixels @ plane)) * z
-        fitted = off <= OUTLIER * np.median(off)
-    return bool(np.median(off) > OFF_PLANE + OFF_PLANE_PER_SQUARE_METRE * seen.depth**2)

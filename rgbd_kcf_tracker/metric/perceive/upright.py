@@ -62,6 +62,15 @@ NEAR = 0.4
 HEADED = 1.45
 """Metres above the floor of a figure's upper end from which its head shows, even where the image
 or something nearer begins there."""
+OFF_PLANE, OFF_PLANE_PER_SQUARE_METRE = 0.01, 0.001
+"""Metres by which a body's surface lies off a plane, in the median of its pixels: twice what a
+pushed box shows, and beyond the noise of a structured-light camera, of which two thirds of a
+deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
+FITS, PIXELS, OUTLIER = 3, 600, 4.0
+"""Rounds of fitting the plane, pixels for it, and medians beyond which one is not fitted to."""
+BOARD_FILL = 0.7
+"""Share of the box that a board or a door's leaf fills, at the least: in the median 0.9, real
+people who show whole 0.55."""
 LENGTH = (1.2, 0.8)
 """Metres of a person whose shape is not told: whole, a child of seven, and cut off above or below,
 as much as from head to hips."""
@@ -139,6 +148,35 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
     return (
         LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.area >= FILL * seen.width * seen.height
     )
+
+
+def rounded(view: DepthView, seen: Silhouette) -> bool:
+    """Whether a silhouette's surface is no plane, as a body's is not and a picture's is."""
+    rows, cols = np.nonzero(seen.mask)
+    some = slice(None, None, max(1, len(rows) // PIXELS))
+    rows, cols = rows[some], cols[some]
+    z = view.depth[seen.rows, seen.cols][rows, cols].astype(np.float64)
+    pixels = np.stack((cols, rows, np.ones(len(z))), axis=1)
+    fitted = np.ones(len(z), np.bool_)
+    off = z
+    for _ in range(FITS):
+        # Along a plane the inverse of depth is affine in the pixel; weighted, to fit in metres.
+        plane, *_ = np.linalg.lstsq(
+            pixels[fitted] * z[fitted, None], np.ones(fitted.sum()), rcond=None
+        )
+        off = np.abs(1 - z * (pixels @ plane)) * z
+        fitted = off <= OUTLIER * np.median(off)
+    return bool(np.median(off) > OFF_PLANE + OFF_PLANE_PER_SQUARE_METRE * seen.depth**2)
+
+
+def board(view: DepthView, seen: Silhouette, top: float | None) -> bool:
+    """Whether a silhouette is a board or a door's leaf: tall, flat, and of no person's shape.
+
+    ``top`` is as of :func:`upright`.
+    """
+    if seen.height < LENGTH[1] or seen.area < BOARD_FILL * seen.width * seen.height:
+        return False
+    return not rounded(view, seen) and not upright(seen, view.intrinsics, top)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
