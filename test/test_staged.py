@@ -117,6 +117,15 @@ def one_who_comes_back_after_ten_others(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), each) for each in (way, *ways)]
 
 
+def child_who_comes_back(stage: Stage, z: float) -> list[Actor]:
+    """It goes out on the left; three cross the room, one after another, before it comes back."""
+    edge, near = 3.4, 2.4
+    way = [(0, -0.5, z), (2.5, -0.5, z), (4.5, -edge, z), (13, -edge, z), (15.5, 0.2, z)]
+    ways = [[(3 + 3 * k, edge, near), (7 + 3 * k, -edge, near)] for k in range(3)]
+    child = dataclasses.replace(stage.person(), height=stage.uniform(1.05, 1.1))
+    return [stage.walk(child, way), *(stage.walk(stage.person(), each) for each in ways)]
+
+
 def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
     """He comes where the target has left, 13 cm taller or shorter at least; then he does."""
     side, out = stage.sign(), 3.0
@@ -138,6 +147,14 @@ def _board(stage: Stage, z: float, high: float) -> Actor:
     """It stands there from the first frame on, and is rolled away."""
     way = [(0, 0.0, z), (3.5, 0.0, z), (4.7, 1.2, z), (9, 1.2, z)]
     return stage.pushed_box(way, (0.9, high, 0.06), 'wood')
+
+
+def one_who_passes_a_board(stage: Stage, z: float) -> list[Actor]:
+    """It is rolled in, as tall and broad as he is, and put down."""
+    way = [(0, stage.x(0.5, z), z), (2, -0.6, z), (9, -0.6, z)]
+    rolled = [(0, 2.6, z + 0.5), (0.5, 2.6, z + 0.5), (2.5, 0.5, z + 0.5), (9, 0.5, z + 0.5)]
+    size = stage.uniform(0.5, 0.8), stage.uniform(1.5, 1.9), 0.04
+    return [stage.walk(stage.person(), way), stage.pushed_box(rolled, size, 'wood')]
 
 
 def two_of_a_kind(stage: Stage, z: float) -> list[Actor]:
@@ -199,6 +216,22 @@ def test_who_stands_behind_what_goes_away_is_no_part_of_the_room(cast: Cast, see
     assert sum(has) > 0.9 * len(has)
 
 
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_board_that_is_rolled_in_is_nobody(seed: int):
+    """It came and was as tall as a person, as a door's leaf is that swings open."""
+    targets, on_board, has = TargetSet('metric'), 0, list[bool]()
+    targets.everyone = True
+    for sample in staged(one_who_passes_a_board, seed, 6.0):
+        tracks = targets.update(sample.frame).values()
+        boxes = [track.box for track in tracks if track.box is not None]
+        person, board = (sample.truths[n].visible for n in (1, 2))
+        if sample.frame.stamp_ns - EPOCH_NS > 1e9:
+            has.append(any(box.iou(person) > 0.5 for box in boxes))
+        on_board += board is not None and any(box.iou(board) > 0.5 for box in boxes)
+    assert on_board <= 5
+    assert np.mean(has) > 0.9
+
+
 @pytest.mark.parametrize('count', [1, 2])
 @pytest.mark.parametrize('seed', [1, 2])
 def test_of_two_robots_that_cross_each_stays_the_one_it_was(seed: int, count: int):
@@ -231,6 +264,23 @@ def test_who_was_chosen_is_known_again_however_many_others_came(seed: int):
             his = track.box is not None and track.box.iou(sample.visible) > 0.5
             scores.append(track.score if his else 0.0)
     assert sum(score > 0.5 for score in scores) > 0.9 * len(scores)
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3, 4])
+def test_a_child_that_comes_back_is_known_again(seed: int):
+    """It was no figure, and what shows of a child was little of a person."""
+    targets, number, has = TargetSet('metric'), 0, list[bool]()
+    for sample in staged(child_who_comes_back, seed, 20.0, rate_hz=5.0):
+        own = sample.truths[1].visible
+        if not number:
+            assert own is not None
+            number = targets.add(sample.frame, own)
+            continue
+        box = targets.update(sample.frame)[number].box
+        if sample.frame.stamp_ns - EPOCH_NS > 15e9:
+            assert own is not None
+            has.append(box is not None and box.iou(own) > 0.4)
+    assert np.mean(has) > 0.8
 
 
 def at(x: float, z: float) -> Placed:

@@ -383,7 +383,7 @@ class Crowd:
             if row == HELD:
                 account.owner[column] = -1
             elif row < 0:
-                small = sight.seen.area < NEW_AREA and not _is_head(account, column)
+                small = sight.seen.area < NEW_AREA and not _stands_apart(account, column)
                 if small or sight.low or _is_piece(account, column):
                     continue
                 newcomer = self._welcome_as(account, sight.seen, column)
@@ -522,11 +522,11 @@ def _followed(
     return here, gone
 
 
-def _is_head(account: Account, column: int) -> bool:
-    """Whether a sight that is small reaches up to where heads are, apart from all others."""
+def _stands_apart(account: Account, column: int) -> bool:
+    """Whether a sight, if small, is all of somebody or up to his head, apart from all others."""
     sight = account.sights[column]
     top = account.scene.top(sight.seen)
-    if top is None or not HEAD_LEVEL < top < TOP[1]:
+    if top is None or not (sight.seen.complete or top > HEAD_LEVEL) or top >= TOP[1]:
         return False
     others = (s.place for n, s in enumerate(account.sights) if n != column)
     apart = all(np.hypot(*(sight.place - place)) > BESIDE for place in others)

@@ -35,6 +35,7 @@ from rgbd_kcf_tracker.metric.identity.tally import Heard
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
+from rgbd_kcf_tracker.metric.perceive.upright import GROWN
 
 SLICES, SLICE = 9, 0.2
 """Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
@@ -100,6 +101,7 @@ class View:
         leans: whether the head is out of sight to the side, and what shows ends below where it is
             when somebody stands: whose height is known leans or falls out of the image.
         distance: metres at which it was seen.
+        of_child: whether it is all of somebody small.
         walking_top: metres, how tall who is there has walked of late; None where nobody has.
         tilt: of the floor above which the top is.
     """
@@ -112,6 +114,7 @@ class View:
     described: Described | None = None
     leans: bool = False
     distance: float = 0.0
+    of_child: bool = False
     walking_top: float | None = None
     tilt: Tilt = LEVEL
 
@@ -161,6 +164,7 @@ class View:
             codes.grey,
             leans=leans,
             distance=float(seen.depth),
+            of_child=top is not None and top < GROWN and seen.complete,
         )
 
     @cached_property
@@ -345,7 +349,12 @@ def _even(views: int, grey: bool) -> float:
 
 
 def look_log_odds(
-    alike: float, area: float, views: int = 1, grey: bool = False, network: float = math.nan
+    alike: float,
+    area: float,
+    views: int = 1,
+    grey: bool = False,
+    network: float = math.nan,
+    whole: float = WHOLE_AREA,
 ) -> float:
     """Log-odds that a view is of the person, from its likeness to the most alike view of his.
 
@@ -356,13 +365,15 @@ def look_log_odds(
         views: how many views of his it was compared with.
         grey: whether the camera sees no colours.
         network: see :attr:`Compared.network`.
+        whole: square metres that show of all of the person, less of a child than of others.
     """
     odds = STEEPNESS * (alike - _even(views, grey))
     if not math.isnan(network):
         odds = BESIDE_NETWORK * odds
         odds += min(network - NETWORK_PER_VIEW * math.log2(views), NETWORK_SAME)
     least = SUREST_OTHER * (ONE_SIDE + (1 - ONE_SIDE) * min(1.0, (views - 1) / ALL_SIDES))
-    told = min(1.0, area / (TELLING_AREA if odds > 0 else WHOLE_AREA))
+    telling = TELLING_AREA * min(1.0, whole / WHOLE_AREA)
+    told = min(1.0, area / (telling if odds > 0 else WHOLE_AREA))
     most = SUREST_PART + (SUREST_SAME - SUREST_PART) * told
     return min(max(odds, least), most) * (PART + (1 - PART) * told)
 
@@ -423,7 +434,7 @@ class Gallery:
         self.looks: Looks | None = None
         self.stature = Stature()
         self._learned: list[_Learned] = []
-        self.largest = 0.0
+        self.largest, self._whole = 0.0, WHOLE_AREA
 
     @property
     def whole(self) -> bool:
@@ -475,7 +486,7 @@ class Gallery:
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self.largest)
-        look = look_log_odds(alike[0], area, views, view.grey, alike[1])
+        look = look_log_odds(alike[0], area, views, view.grey, alike[1], self._whole)
         return odds + (max(look, 0.0) if self.mixed else look)
 
     @classmethod
@@ -554,6 +565,8 @@ class Gallery:
         trust = [each.trust for each in learned]
         self.looks = Looks.of(self.views, trust) if learned else None
         self.largest = max((view.total for view in self.views), default=0.0)
+        child = (view.total for view in self.views if view.of_child)
+        self._whole = max(child, default=WHOLE_AREA)
 
     def _most_redundant(self) -> int:
         """Of those least trusted the one most alike another, the older of two.

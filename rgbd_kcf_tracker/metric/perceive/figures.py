@@ -32,7 +32,9 @@ more than :data:`LEAST_PIECE`."""
 LEAST_PIECE = 0.004
 """Square metres below which a piece is noise: a patch of some 6 cm, smaller than a hand."""
 LEAST_AREA = 0.06
-"""Square metres from which something is a figure: about a head and a shoulder."""
+"""Square metres from which something is a figure, if it is all of somebody or more of it may be
+hidden: about a head and a shoulder, or a child of four from the side (0.07). Else it is twice as
+much."""
 LEAST_HEIGHT = 0.35
 LEAST_TOP = 0.6
 """Metres above the floor that a figure reaches: what is lower is no person, not even a seated
@@ -232,8 +234,8 @@ def _shared(before: Silhouette, seen: Silhouette) -> float:
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette that stands before the room is large and high enough for a figure."""
-    cut_off = seen.cut.any
-    if seen.area < (LEAST_AREA if cut_off else 2 * LEAST_AREA) or seen.height < LEAST_HEIGHT:
+    least = LEAST_AREA if seen.cut.any or seen.complete else 2 * LEAST_AREA
+    if seen.area < least or seen.height < LEAST_HEIGHT:
         return False
     lowest = None if seen.cut.bottom else seen.lowest(scene.elevation)
     if lowest is not None and lowest > FLOATS:
