@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import TargetSet
+from rgbd_kcf_tracker import Intrinsics, TargetSet
 from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
 from rgbd_kcf_tracker.metric.identity.body import Placed
 from rgbd_kcf_tracker.pose import Pose
@@ -27,6 +27,8 @@ from rgbd_kcf_tracker.simulation.stage import Stage, route
 from rgbd_kcf_tracker.simulation.world import Actor
 
 SIZE, RATE_HZ = (320, 240), 10.0
+NARROW = Intrinsics(285.0, 285.0, 159.5, 119.5)
+"""60 degrees, as a Kinect v1 has."""
 FINE = 640, 360
 
 
@@ -39,9 +41,10 @@ def staged(
     seconds: float,
     size: tuple[int, int] = SIZE,
     rate_hz: float = RATE_HZ,
+    camera: Intrinsics | None = None,
 ) -> SimulatedSequence:
     """A cast in a room, the first of them chosen to be followed."""
-    camera = kinect2_intrinsics(size)
+    camera = camera or kinect2_intrinsics(size)
     stage = Stage(np.random.default_rng(seed), camera, size)
     stage.place_camera(0.9, 1.4)
     scene = stage.scene(cast(stage, stage.uniform(2.5, 3.2)), seconds, room=stage.room((0, 1)))
@@ -91,6 +94,18 @@ def person_behind_one_who_comes_near(stage: Stage, z: float) -> list[Actor]:
     near = [(0, 0.5, z), (0.5, 0.5, z), (3, 0.05, 0.6), (5, 0.05, 0.6), (7.5, -0.5, z)]
     way = [(0, -0.8, 4.0), (3, -0.8, 4.0), (4.8, 0.6, z), (9, 0.6, z)]
     return [stage.walk(stage.person(), way), stage.walk(stage.person(), near, [(0, 0)])]
+
+
+def person_who_fills_the_view(stage: Stage, z: float) -> list[Actor]:
+    """He goes past the camera, out at the lower edge, and back from there, before one at the back.
+
+    Of the first that shows of him then there is no reading, and after that he hides most.
+    """
+    z = 3.1
+    way = [(0, -0.6, z), (1, -0.6, z), (3.2, 0.1, 0.8), (4.8, 0.2, -1.0), (7, 0.2, -1.0)]
+    way += [(8.6, 0.1, 0.55), (9.6, 0.1, 0.65), (12, 0.4, z), (16, 0.4, z)]
+    stays = stage.walk(stage.person(), [(0, 1.1, 4.3), (9, 0.9, 4.2), (16, 1.1, 4.3)])
+    return [stage.walk(stage.person(), way), stays]
 
 
 def two_who_hug(stage: Stage, z: float) -> list[Actor]:
@@ -230,6 +245,14 @@ def test_a_board_that_is_rolled_in_is_nobody(seed: int):
         on_board += board is not None and any(box.iou(board) > 0.5 for box in boxes)
     assert on_board <= 5
     assert np.mean(has) > 0.9
+
+
+@pytest.mark.parametrize('seed', [10, 11])
+def test_who_fills_the_view_is_no_part_of_the_room(seed: int):
+    """The camera seemed to have moved, and he was the room: never known again, and it walked."""
+    (has,) = followed(staged(person_who_fills_the_view, seed, 14.0, SIZE, 5.0, NARROW))
+    assert len(has) > 30
+    assert sum(has) > 0.9 * len(has)
 
 
 @pytest.mark.parametrize('count', [1, 2])

@@ -45,6 +45,9 @@ SETTLE = 3.0
 AGREEING = 0.5
 """Share of readings where they were from which the camera stands where it stood, and of the room
 that has readings from which a view tells what has none any more."""
+AT_HAND = 1.2
+"""Metres from the camera within which somebody hides most of the room: who is 0.6 m wide fills half
+of a view of 60 degrees from there."""
 MOST = 0.5
 """Share of where a part of a surface that was hidden meets what is known, along which it goes on as
 the room, from which that part is room, too; and of somebody's pixels, from which they are his."""
@@ -250,11 +253,20 @@ class Room:
         near: Mask = (nearer > np.float32(CLOSER) * allowed) & (nearer <= allowed)
         return near & (depth > 0) & (room > 0)
 
-    def agrees(self, depth: Floats) -> bool:
-        """Whether a view, ``(h, w)`` metres, mostly shows the room where it was."""
+    def agrees(self, depth: Floats, surely: bool = True) -> bool:
+        """Whether a view, ``(h, w)`` metres, mostly shows the room where it was.
+
+        Args:
+            depth: the view.
+            surely: False where nothing else says that the camera has moved: then what is close
+                before the room is somebody, who hides it, and the rest tells. Else he would be the
+                room from then on, and the room behind him somebody.
+        """
         if depth.shape != self.depth.shape:
             return False
         both = (depth > 0) & (self.depth > 0)
+        if not surely:
+            both &= ~((depth < np.float32(AT_HAND)) & self._nearer(depth))
         same = np.abs(depth - self.depth)[both] <= 0.5 * tolerance(depth)[both]
         return bool(same.size and same.mean() > AGREEING)
 

@@ -185,7 +185,7 @@ class SceneReader:
         learns = unlearned is not None
         image = view_image(frame.color, view.step)
         motion = way = self._move(image, view, frame.pose, seconds)
-        if isinstance(way, Lost) and self.room.agrees(view.depth):
+        if isinstance(way, Lost) and self.room.agrees(view.depth, way.surely):
             motion, way = None, way if way.surely else None
         floor = (
             self._floors.update(view, seconds, learns, motion) if self._floor_margin > 0 else None
