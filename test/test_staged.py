@@ -247,11 +247,11 @@ def test_a_board_that_is_rolled_in_is_nobody(seed: int):
     assert np.mean(has) > 0.9
 
 
-@pytest.mark.parametrize('seed', [10, 11])
+@pytest.mark.parametrize('seed', [3, 10, 11])
 def test_who_fills_the_view_is_no_part_of_the_room(seed: int):
     """The camera seemed to have moved, and he was the room: never known again, and it walked."""
     (has,) = followed(staged(person_who_fills_the_view, seed, 14.0, SIZE, 5.0, NARROW))
-    assert len(has) > 30
+    assert len(has) > 25
     assert sum(has) > 0.9 * len(has)
 
 

@@ -48,6 +48,9 @@ that has readings from which a view tells what has none any more."""
 AT_HAND = 1.2
 """Metres from the camera within which somebody hides most of the room: who is 0.6 m wide fills half
 of a view of 60 degrees from there."""
+TELLS = 0.05
+"""Share of the room that must show, at the least, to tell that it is another: who is so close that
+he gives no reading leaves some at his outline."""
 MOST = 0.5
 """Share of where a part of a surface that was hidden meets what is known, along which it goes on as
 the room, from which that part is room, too; and of somebody's pixels, from which they are his."""
@@ -259,14 +262,17 @@ class Room:
         Args:
             depth: the view.
             surely: False where nothing else says that the camera has moved: then what is close
-                before the room is somebody, who hides it, and the rest tells. Else he would be the
-                room from then on, and the room behind him somebody.
+                before the room is somebody, who hides it, and the rest tells, if there is any; a
+                later view will. Else he would be the room from then on, and what is behind him
+                somebody.
         """
         if depth.shape != self.depth.shape:
             return False
         both = (depth > 0) & (self.depth > 0)
         if not surely:
             both &= ~((depth < np.float32(AT_HAND)) & self._nearer(depth))
+            if np.count_nonzero(both) < TELLS * np.count_nonzero(self.depth):
+                return bool(self.depth.any())
         same = np.abs(depth - self.depth)[both] <= 0.5 * tolerance(depth)[both]
         return bool(same.size and same.mean() > AGREEING)
 
