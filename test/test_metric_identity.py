@@ -491,6 +491,29 @@ def test_a_view_of_all_of_him_takes_the_place_of_a_part_that_looks_the_same():
     assert gallery.views == [part], 'it had nothing but what was another'
 
 
+def test_a_view_that_has_taken_the_place_of_several_gives_all_of_them_back():
+    """The last of them alone came back."""
+    roots = look(RED, GREEN).roots
+    several = [
+        dataclasses.replace(look(RED, GREEN), roots=_turned(roots, angle)) for angle in (-25, 25, 0)
+    ]
+    gallery = Gallery()
+    for time, view in enumerate(several):
+        gallery.learn(view, float(time), 0.0 if time < 2 else math.inf)
+    assert gallery.views == several[2:]
+    gallery.taken_back(2.0)
+    assert gallery.views == several[:2]
+
+
+def _turned(roots: np.ndarray, angle: float) -> np.ndarray:
+    """Square roots of a histogram, so many degrees away from those of another."""
+    other = np.roll(roots, 7 if angle > 0 else 9, axis=2)
+    cos, sin = math.cos(math.radians(angle)), abs(math.sin(math.radians(angle)))
+    turned = cos * roots + sin * other
+    length = np.sqrt(np.square(turned).sum(axis=(1, 2), keepdims=True))
+    return np.where(length > 0, turned / np.maximum(length, 1e-6), 0).astype(np.float32)
+
+
 def test_a_copy_of_a_gallery_learns_for_itself():
     gallery = Gallery()
     gallery.learn(look(RED), 0.0)

@@ -400,13 +400,13 @@ class _Learned:
     """A view, the seconds when it was seen, and the log-odds that it is of this person.
 
     Attributes:
-        before: what it has taken the place of, None for nothing.
+        before: what it has taken the place of.
     """
 
     view: View
     time: float
     trust: float = math.inf
-    before: _Learned | None = None
+    before: tuple[_Learned, ...] = ()
 
     def says_more(self, other: _Learned) -> bool:
         """Whether it says more than one of the same look: surer, or of all of him, not a part."""
@@ -510,8 +510,7 @@ class Gallery:
             twins = [each for each, is_twin in zip(learned, alike.tolist(), strict=True) if is_twin]
             if not all(new.says_more(each) for each in twins):
                 return
-            if twins:
-                new = replace(new, before=replace(twins[-1], before=None))
+            new = replace(new, before=tuple(replace(each, before=()) for each in twins))
             learned = [each for each in learned if each not in twins]
             if len(learned) >= MOST_VIEWS:
                 del learned[self._most_redundant()]
@@ -555,8 +554,8 @@ class Gallery:
         late = Gallery()
         late._set_learned([_Learned(e.view, e.time) for e in self._learned if e.time >= since])
         # What has taken another's place gives it back.
-        before = (each if each.time < since else each.before for each in self._learned)
-        self._set_learned([each for each in before if each is not None and each.time < since])
+        before = [(each,) if each.time < since else each.before for each in self._learned]
+        self._set_learned([each for those in before for each in those if each.time < since])
         late.stature = self.stature.taken_back(since)
         return late
 
