@@ -172,6 +172,11 @@ def one_who_passes_a_board(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), way), stage.pushed_box(rolled, size, 'wood')]
 
 
+def who_walks_beside_steel(stage: Stage, z: float) -> list[Actor]:
+    way = [(0, -1.3, z), (1, -1.3, z), (3, -0.3, z), (4, -0.3, z), (7, -1.3, z), (9, -0.3, z)]
+    return [stage.walk(stage.person(), way)]
+
+
 def two_of_a_kind(stage: Stage, z: float) -> list[Actor]:
     """The farther first."""
     size = stage.uniform(0.4, 0.5), stage.uniform(0.45, 0.55), 0.36
@@ -304,6 +309,23 @@ def test_a_child_that_comes_back_is_known_again(seed: int):
             assert own is not None
             has.append(box is not None and box.iou(own) > 0.4)
     assert np.mean(has) > 0.8
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_a_wall_that_is_read_now_and_then_is_nobody(seed: int):
+    """Steel and glass give a reading here and there: each was somebody who had come."""
+    targets, rng, boxes = TargetSet('metric'), np.random.default_rng(seed), 0
+    targets.everyone = True
+    for sample in staged(who_walks_beside_steel, seed, 9.0):
+        frame, shown = sample.frame, sample.truth.shown
+        assert frame.depth is not None
+        assert shown is not None
+        depth, patch = frame.depth.copy(), np.s_[60:170, 176:256]
+        blocks = np.kron(rng.uniform(size=(37, 27)), np.ones((3, 3)))[:110, :80]
+        depth[patch][(depth[patch] > 3.3) & (blocks > 0.25)] = np.nan
+        for track in targets.update(dataclasses.replace(frame, depth=depth)).values():
+            boxes += track.box is not None and track.box.intersection(shown) < 0.3 * track.box.area
+    assert boxes < 5
 
 
 def at(x: float, z: float) -> Placed:

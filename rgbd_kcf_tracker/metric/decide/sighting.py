@@ -17,7 +17,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import HEADED, board, person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import HEADED, flat, person_sized, upright
 
 SURE = 1.0
 """Log-odds by which a chosen one must be ahead of all others to be learned from, and others of him;
@@ -66,8 +66,7 @@ def learn_sighting(
         if joined is not None:
             person.joined.add(joined, weight, account.time)
     if index >= 0 and not person.chosen:
-        flat = board(scene.view, seen, scene.top(seen))
-        person.board.add(float(flat), weight, account.time)
+        person.flat.add(float(flat(scene.view, seen, scene.top(seen))), weight, account.time)
     if not sure or (scene.since is None and person.gallery.views):
         return
     person.area = max(person.area, seen.area)

@@ -60,8 +60,8 @@ JOINED = 0.3
 """Share of an outline that is joined to something large, from which it is of a piece of that and
 not of somebody: of real and simulated people one sighting in five hundred has it, of pieces of
 walls more than half."""
-BOARD = 0.5
-"""Share of the sightings as a board from which a thing is one: most of them."""
+FLAT = 0.5
+"""Share of the sightings as something flat from which it is flat: most of them."""
 FALLS = 0.6
 """Seconds without a sight in which somebody falls, at the most: some frames at 5 Hz."""
 ANYWHERE = 0.02
@@ -70,7 +70,7 @@ fifty boxes one is on something else."""
 
 _OF_NOW = (
     *('place', 'velocity', 'seen_at', 'came', 'misses', 'last', 'calm', 'hidden', 'figure'),
-    *('joined', 'board'),
+    *('joined', 'flat'),
 )
 """Attributes that go along with who is seen where he turns out to be somebody else."""
 
@@ -103,8 +103,8 @@ class Person:
         travelled: metres, the farthest from where it was first seen.
         joined: the shares of its outline where it is joined to something large, as seen by a camera
             that has moved lately.
-        board: 1 for each sighting as a board, 0 for others, see
-            :func:`~rgbd_kcf_tracker.metric.perceive.upright.board`; nothing of who was chosen.
+        flat: 1 for each sighting as something flat, 0 for others, see
+            :func:`~rgbd_kcf_tracker.metric.perceive.upright.flat`; none of who was chosen.
         again: log-odds that it is one of those who had gone before it came, by its looks alone, see
             :class:`~rgbd_kcf_tracker.metric.decide.arrivals.Arrival`.
     """
@@ -121,7 +121,7 @@ class Person:
         self.last: Silhouette | None = None
         self.calm: Calm | None = None
         self.area, self.again = 0.0, -math.inf
-        self.joined, self.board = Tally(), Tally()
+        self.joined, self.flat = Tally(), Tally()
         self._resembles: dict[int, Heard] = {}
         self.gallery = Gallery()
 
@@ -133,8 +133,8 @@ class Person:
         # What goes on beside it is something that it is a piece of, as of a wall.
         joined = self.joined.mean if self.joined.enough else None
         apart = joined is None or joined <= JOINED
-        board = (self.board.mean or 0.0) > BOARD
-        return (self.upright or self.travelled > TRAVELLED) and apart and not board
+        flat = (self.flat.mean or 0.0) > FLAT
+        return (self.upright or self.travelled > TRAVELLED) and apart and not flat
 
     @property
     def walks(self) -> bool:

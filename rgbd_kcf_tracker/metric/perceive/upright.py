@@ -68,9 +68,9 @@ pushed box shows, and beyond the noise of a structured-light camera, of which tw
 deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
 FITS, PIXELS, OUTLIER = 3, 600, 4.0
 """Rounds of fitting the plane, pixels for it, and medians beyond which one is not fitted to."""
-BOARD_FILL = 0.7
-"""Share of the box that a board or a door's leaf fills, at the least: in the median 0.9, real
-people who show whole 0.55."""
+SPARSE, SOLID = 0.4, 0.7
+"""Shares of the box that a flat thing fills, at the most and at the least: a wall of which readings
+come and go a quarter, a door's leaf nine tenths, in the median, and real people 0.55."""
 LENGTH = (1.2, 0.8)
 """Metres of a person whose shape is not told: whole, a child of seven, and cut off above or below,
 as much as from head to hips."""
@@ -169,12 +169,13 @@ def rounded(view: DepthView, seen: Silhouette) -> bool:
     return bool(np.median(off) > OFF_PLANE + OFF_PLANE_PER_SQUARE_METRE * seen.depth**2)
 
 
-def board(view: DepthView, seen: Silhouette, top: float | None) -> bool:
-    """Whether a silhouette is a board or a door's leaf: tall, flat, and of no person's shape.
+def flat(view: DepthView, seen: Silhouette, top: float | None) -> bool:
+    """Whether a silhouette is a door's leaf, or some readings of a wall, and has no person's shape.
 
-    ``top`` is as of :func:`upright`.
+    It is tall and flat, and fills its box as nobody does. ``top`` is as of :func:`upright`.
     """
-    if seen.height < LENGTH[1] or seen.area < BOARD_FILL * seen.width * seen.height:
+    fill = seen.area / (seen.width * seen.height)
+    if seen.height < LENGTH[1] or SPARSE < fill < SOLID:
         return False
     return not rounded(view, seen) and not upright(seen, view.intrinsics, top)
 
