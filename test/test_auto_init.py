@@ -13,14 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Box, Frame, Intrinsics
+from rgbd_kcf_tracker import Box, Frame
 from rgbd_kcf_tracker.bench import auto_init as bench
 from rgbd_kcf_tracker.evaluation.datasets.base import Annotation, Sample
 from rgbd_kcf_tracker.live.auto_init import AutoInit
 from rgbd_kcf_tracker.live.settings import NodeParameters
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
-from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import rounded
 from rgbd_kcf_tracker.recordings import SequenceWriter
 
 SETTINGS = NodeParameters(auto_init=True)
@@ -87,22 +84,6 @@ def test_nobody_is_found_without_depth_or_more_often_than_need_be() -> None:
         if step == 12:
             break
     assert found > 0
-
-
-@pytest.mark.parametrize(
-    ('bulge', 'turned', 'round_'),
-    [(0.0, 0.0, False), (0.0, 0.3, False), (0.12, 0.0, True), (0.12, 0.1, True)],
-)
-def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool) -> None:
-    """Half a cylinder as thick as a trunk, and a board, square to the camera or turned."""
-    u = np.linspace(-1, 1, 40, dtype=np.float32)
-    depth = np.zeros((120, 160), np.float32)
-    rng = np.random.default_rng(1)
-    trunk = 3.0 - bulge * np.sqrt(1 - 0.95 * u**2) + turned * u
-    depth[20:100, 60:100] = trunk + rng.normal(0, 0.012, (80, 40))
-    view = DepthView(depth, 1, Intrinsics.guess(160, 120))
-    seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
-    assert rounded(view, seen) is round_
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.room import REACH, SETTLE, GoingOn, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import upright, upright_people
+from rgbd_kcf_tracker.metric.perceive.upright import child, flat, rounded, upright, upright_people
 from rgbd_kcf_tracker.pose import Pose
 
 NOBODY = np.zeros((ROWS, COLS), bool)
@@ -805,6 +805,41 @@ def test_whoever_is_tall_and_has_a_neck_is_a_person(
         depth[max(v0, 0) : v1, u0 : u0 + round(wide * CAMERA.fx / 2.5)] = 2.5
         top = bottom
     assert upright(silhouette(depth), CAMERA, None) == person
+
+
+@pytest.mark.parametrize(
+    ('bulge', 'turned', 'round_'),
+    [(0.0, 0.0, False), (0.0, 0.3, False), (0.12, 0.0, True), (0.12, 0.1, True)],
+)
+def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool):
+    """Half a cylinder as thick as a trunk, and a board, square to the camera or turned."""
+    u = np.linspace(-1, 1, 40, dtype=np.float32)
+    depth = np.zeros((120, 160), np.float32)
+    rng = np.random.default_rng(1)
+    trunk = 3.0 - bulge * np.sqrt(1 - 0.95 * u**2) + turned * u
+    depth[20:100, 60:100] = trunk + rng.normal(0, 0.012, (80, 40))
+    view = DepthView(depth, 1, Intrinsics.guess(160, 120))
+    seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
+    assert rounded(view, seen) is round_
+    assert flat(view, seen, None) is not round_
+    half = np.ones((80, 40), np.bool_)
+    half[::2, 1:-1] = False
+    assert not flat(view, Silhouette.of(view, 60, 20, half, 0, Rim()), None), 'as a body fills it'
+
+
+@pytest.mark.parametrize(
+    ('height', 'top', 'is_child'),
+    [(1.0, 1.0, True), (1.0, 1.2, True), (0.7, 0.75, False), (1.0, 1.35, False), (1.4, 1.4, False)],
+)
+def test_a_child_shows_whole_and_stands_on_the_floor(height: float, top: float, is_child: bool):
+    rows = round(height * CAMERA.fy / 2.0)
+    depth = wall()
+    depth[10 : 10 + rows, 100:115] = 2.0
+    seen = silhouette(depth)
+    assert child(seen, top) is is_child
+    assert not child(seen, None)
+    depth[10 + rows - 4 :] = 1.0
+    assert not child(silhouette(depth), top), 'something nearer hides its feet'
 
 
 @pytest.mark.parametrize(('high', 'people'), [(0, True), (55, False)])

@@ -42,7 +42,7 @@ from rgbd_kcf_tracker.metric.perceive.parting import APART
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import CAMERA_AXES, Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import TOP
+from rgbd_kcf_tracker.metric.perceive.upright import TOP, child
 from rgbd_kcf_tracker.pose import Pose
 
 NEW_AREA = 0.12
@@ -526,7 +526,7 @@ def _stands_apart(account: Account, column: int) -> bool:
     """Whether a sight, if small, is all of somebody or up to his head, apart from all others."""
     sight = account.sights[column]
     top = account.scene.top(sight.seen)
-    if top is None or not (sight.seen.complete or top > HEAD_LEVEL) or top >= TOP[1]:
+    if top is None or not (child(sight.seen, top) or top > HEAD_LEVEL) or top >= TOP[1]:
         return False
     others = (s.place for n, s in enumerate(account.sights) if n != column)
     apart = all(np.hypot(*(sight.place - place)) > BESIDE for place in others)

@@ -35,7 +35,7 @@ from rgbd_kcf_tracker.metric.identity.tally import Heard
 from rgbd_kcf_tracker.metric.perceive.colors import CODES, LIGHTNESS, TINTS, ColorCodes, smoothed
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import GROWN
+from rgbd_kcf_tracker.metric.perceive.upright import child
 
 SLICES, SLICE = 9, 0.2
 """Slices of a body and their height in metres: 1.8 m, the last also holds what is below."""
@@ -164,7 +164,7 @@ class View:
             codes.grey,
             leans=leans,
             distance=float(seen.depth),
-            of_child=top is not None and top < GROWN and seen.complete,
+            of_child=child(seen, top),
         )
 
     @cached_property

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.perceive.parting import BROAD, parted
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import UPPER, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces, surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import GROWN
+from rgbd_kcf_tracker.metric.perceive.upright import GROWN, child
 
 JUMP, JUMP_PER_METRE = 0.06, 0.04
 """Depth step between two figures: limbs stand off the trunk farther than one surface may step."""
@@ -234,13 +234,14 @@ def _shared(before: Silhouette, seen: Silhouette) -> float:
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:
     """Whether a silhouette that stands before the room is large and high enough for a figure."""
-    least = LEAST_AREA if seen.cut.any or seen.complete else 2 * LEAST_AREA
-    if seen.area < least or seen.height < LEAST_HEIGHT:
+    if seen.area < LEAST_AREA or seen.height < LEAST_HEIGHT:
+        return False
+    highest = seen.highest(scene.elevation)
+    if seen.area < 2 * LEAST_AREA and not (seen.cut.any or child(seen, highest)):
         return False
     lowest = None if seen.cut.bottom else seen.lowest(scene.elevation)
     if lowest is not None and lowest > FLOATS:
         return False
-    highest = seen.highest(scene.elevation)
     return highest is None or highest >= LEAST_TOP
 
 

@@ -31,8 +31,6 @@ CUT_SHARE = 0.3
 0.21 everyone's MOTA was 1.6 points lower, at 0.42 walks at 1 Hz were (docs/experiments.md)."""
 UPPER = 0.98
 """Share of a silhouette's pixels that lie below its upper end: the topmost may be noise."""
-SMALLEST = 0.8
-"""Metres from top to bottom that show of a child of four, who is 1.05 m tall, at the least."""
 
 
 class Rim(NamedTuple):
@@ -160,11 +158,6 @@ class Silhouette:
     def meets(self, other: Silhouette) -> bool:
         """Whether another silhouette of the same view shares a pixel with it."""
         return bool(self.common(other).any())
-
-    @property
-    def complete(self) -> bool:
-        """Whether it is all of somebody, if of anybody: nothing hides more of him."""
-        return self.height > SMALLEST and not self.cut.any
 
     @property
     def rows(self) -> slice:

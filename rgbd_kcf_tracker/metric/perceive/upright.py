@@ -68,9 +68,12 @@ pushed box shows, and beyond the noise of a structured-light camera, of which tw
 deviation, 0.001 times the square of depth, is the same of a wall (Khoshelham and Elberink 2012)."""
 FITS, PIXELS, OUTLIER = 3, 600, 4.0
 """Rounds of fitting the plane, pixels for it, and medians beyond which one is not fitted to."""
-SPARSE, SOLID = 0.4, 0.7
+SPARSE, SOLID = 0.3, 0.7
 """Shares of the box that a flat thing fills, at the most and at the least: a wall of which readings
 come and go a quarter, a door's leaf nine tenths, in the median, and real people 0.55."""
+CHILD, FEET = 0.8, 0.25
+"""Metres that show of a child of four, who is 1.05 m tall, at the least, and above the floor where
+that begins at the most: feet are as near to the floor as its height is uncertain."""
 LENGTH = (1.2, 0.8)
 """Metres of a person whose shape is not told: whole, a child of seven, and cut off above or below,
 as much as from head to hips."""
@@ -167,6 +170,16 @@ def rounded(view: DepthView, seen: Silhouette) -> bool:
         off = np.abs(1 - z * (pixels @ plane)) * z
         fitted = off <= OUTLIER * np.median(off)
     return bool(np.median(off) > OFF_PLANE + OFF_PLANE_PER_SQUARE_METRE * seen.depth**2)
+
+
+def child(seen: Silhouette, top: float | None) -> bool:
+    """Whether a silhouette is all of somebody small, if of anybody: nothing hides more of it.
+
+    ``top`` is as of :func:`upright`.
+    """
+    if seen.cut.any or top is None or not seen.height > CHILD or top >= GROWN:
+        return False
+    return top - seen.height < FEET and seen.area > SPARSE * seen.width * seen.height
 
 
 def flat(view: DepthView, seen: Silhouette, top: float | None) -> bool:
