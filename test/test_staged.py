@@ -395,3 +395,22 @@ def test_who_comes_out_beside_a_walker_in_the_same_clothes_is_not_taken_for_him(
         box, twin = targets.update(sample.frame)[number].box, sample.truths[4].visible
         mistaken += box is not None and twin is not None and box.iou(twin) > 0.5
     assert mistaken == 0
+
+
+def test_who_was_hidden_is_shown_by_how_he_looks_once_he_shows_whole():
+    """What the place said against him in one frame kept his score at one half for good."""
+    targets, number, scores = TargetSet('metric'), 0, list[float]()
+    scene = simulate('at_home', seed=13, size=(480, 360), rate_hz=10.0)
+    for index in range(69, 146):
+        sample = scene[index]
+        own = sample.truths[2].visible
+        if not number:
+            if own is not None and own.width > 20:
+                number = targets.add(sample.frame, own)
+            continue
+        track = targets.update(sample.frame)[number]
+        if index > 137:
+            assert track.box is not None
+            assert track.box.iou(own) > 0.5
+            scores.append(track.score)
+    assert min(scores) > 0.6

@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike, view_in
 from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
+from rgbd_kcf_tracker.metric.identity.gallery import SUREST_PART, Gallery, View
 from rgbd_kcf_tracker.metric.identity.middle import (
     Belief,
     in_metres,
@@ -362,7 +362,8 @@ class Follower:
         score = 0.0 if found is None else found.probability
         if found is not None and self._comeback is None and self._seen_again(surface, dt):
             # His chances are those of this frame, and only his looks change them from here on.
-            against = surface.person.gallery.log_odds(account.look(found.seen)) - logit(score)
+            looks = surface.person.gallery.log_odds(account.look(found.seen))
+            against = min(looks - logit(score), SUREST_PART)  # they can say no more than that
             self._comeback = Comeback(surface.person, account.time, against, place=True)
             _likely(self._comeback, account, surface.person, found)
         elif self._comeback is not None:
