@@ -172,6 +172,14 @@ def one_who_passes_a_board(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), way), stage.pushed_box(rolled, size, 'wood')]
 
 
+def one_who_passes_a_trolley(stage: Stage, z: float) -> list[Actor]:
+    """It is rolled in, lower than he is, and left there."""
+    way = [(0, stage.x(0.5, z), z), (2, -0.6, z), (9, -0.6, z)]
+    rolled = [(0, 2.6, z + 0.3), (0.5, 2.6, z + 0.3), (2.5, 0.5, z + 0.3), (9, 0.5, z + 0.3)]
+    size = stage.uniform(0.4, 0.5), stage.uniform(0.66, 0.76), 0.36
+    return [stage.walk(stage.person(), way), stage.pushed_box(rolled, size, 'wood')]
+
+
 def who_walks_beside_steel(stage: Stage, z: float) -> list[Actor]:
     way = [(0, -1.3, z), (1, -1.3, z), (3, -0.3, z), (4, -0.3, z), (7, -1.3, z), (9, -0.3, z)]
     return [stage.walk(stage.person(), way)]
@@ -249,6 +257,22 @@ def test_a_board_that_is_rolled_in_is_nobody(seed: int):
             has.append(any(box.iou(person) > 0.5 for box in boxes))
         on_board += board is not None and any(box.iou(board) > 0.5 for box in boxes)
     assert on_board <= 5
+    assert np.mean(has) > 0.9
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_a_trolley_that_is_left_is_nobody(seed: int):
+    """It had moved, and was somebody for as long as it stood there."""
+    targets, on_trolley, has = TargetSet('metric'), 0, list[bool]()
+    targets.everyone = True
+    for sample in staged(one_who_passes_a_trolley, seed, 7.0):
+        tracks = targets.update(sample.frame).values()
+        boxes = [track.box for track in tracks if track.box is not None]
+        person, trolley = (sample.truths[n].visible for n in (1, 2))
+        if sample.frame.stamp_ns - EPOCH_NS > 5e9:
+            has.append(any(box.iou(person) > 0.5 for box in boxes))
+            on_trolley += any(box.iou(trolley) > 0.5 for box in boxes)
+    assert on_trolley <= 5
     assert np.mean(has) > 0.9
 
 

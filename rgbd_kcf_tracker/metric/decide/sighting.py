@@ -130,8 +130,9 @@ def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
     calm = person.calm
     if calm is not None and calm.holds(seen, scene.image):
         return calm
-    # Who was a person by his shape alone may have been one figure with what he touched.
-    by_shape = person.upright and not person.chosen and person.travelled <= TRAVELLED
-    if by_shape and not upright(seen, scene.view.intrinsics, account.look(seen).top):
+    # Who was a person by his shape alone may have been one figure with what he touched, and who
+    # is one only as he was moved may be a chair.
+    sure = person.chosen or (person.upright and person.travelled > TRAVELLED)
+    if not sure and not upright(seen, scene.view.intrinsics, account.look(seen).top):
         return Calm(seen, scene.view, scene.image, account.time)
     return None
