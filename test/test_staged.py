@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rgbd_kcf_tracker import Intrinsics, TargetSet
+from rgbd_kcf_tracker import Box, Intrinsics, TargetSet
 from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
 from rgbd_kcf_tracker.metric.identity.body import Placed
 from rgbd_kcf_tracker.pose import Pose
@@ -139,6 +139,14 @@ def child_who_comes_back(stage: Stage, z: float) -> list[Actor]:
     ways = [[(3 + 3 * k, edge, near), (7 + 3 * k, -edge, near)] for k in range(3)]
     child = dataclasses.replace(stage.person(), height=stage.uniform(1.05, 1.1))
     return [stage.walk(child, way), *(stage.walk(stage.person(), each) for each in ways)]
+
+
+def one_seen_from_his_side(stage: Stage, z: float) -> list[Actor]:
+    """He stands and looks to the right; somebody passes before him, and he walks away."""
+    way = [(0, 0, z), (5, 0, z), (7, 0.8, z), (8, 0.8, z)]
+    passes = [(0, -3.2, z - 0.6), (5.5, 3.2, z - 0.6)]
+    he = stage.walk(stage.person(), way, [(0, 1.5)])
+    return [he, stage.walk(stage.person(), passes)]
 
 
 def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
@@ -438,3 +446,19 @@ def test_who_was_hidden_is_shown_by_how_he_looks_once_he_shows_whole():
             assert track.box.iou(own) > 0.5
             scores.append(track.score)
     assert min(scores) > 0.6
+
+
+@pytest.mark.parametrize('seed', [1, 2, 5])
+def test_who_is_seen_from_his_side_and_drawn_by_half_is_followed_as_a_whole(seed: int):
+    sequence = staged(one_seen_from_his_side, seed, 8)
+    first = sequence[0]
+    box = first.truth.visible
+    assert box is not None
+    targets = TargetSet('metric')
+    number = targets.add(first.frame, Box(box.x, box.y, box.width, 0.48 * box.height))
+    right = []
+    for sample in itertools.islice(sequence, 1, None):
+        found, truth = targets.update(sample.frame)[number].box, sample.truth
+        if truth.visible is not None and truth.visible_fraction > 0.8:
+            right.append(found is not None and found.iou(truth.visible) > 0.4)
+    assert np.mean(right) > 0.95

@@ -24,7 +24,7 @@ from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP, UPRIGHT, depth_
 from rgbd_kcf_tracker.metric.perceive.parting import BEHIND, BROAD
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
-from rgbd_kcf_tracker.metric.perceive.upright import TOP, person_sized, upright
+from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, LENGTH, TOP, person_sized, upright
 
 LOCK_IOU = 0.5
 """Overlap of the given box with a surface's from which the surface is taken for the target: from
@@ -92,6 +92,10 @@ def surface_of(account: Account, box: Box, parameters: MetricParameters) -> Silh
     behind = _pieces_in(scene, told, 0.0 if whole is None else _fit(box_about(scene, whole), told))
     if whole is not None:
         return behind or _within(scene, whole, box)
+    # Seen from their sides people have no person's shape, and shoulders hide their necks.
+    half = _pieces_in(scene, Box(told.x, told.y, told.width, 2 * told.height), 0.0)
+    if half is not None and LENGTH[0] <= half.height <= HEIGHT[1]:
+        return half
     piece = _piece_of(scene, told)
     if piece is not None and _found_again(account, piece, parameters):
         return piece
