@@ -16,6 +16,7 @@ import pytest
 from rgbd_kcf_tracker import Box, Intrinsics, TargetSet
 from rgbd_kcf_tracker.metric.decide.neighbours import Neighbours
 from rgbd_kcf_tracker.metric.identity.body import Placed
+from rgbd_kcf_tracker.metric.pointing import target_at
 from rgbd_kcf_tracker.pose import Pose
 from rgbd_kcf_tracker.simulation import simulate
 from rgbd_kcf_tracker.simulation.actors import FacesActor, mug
@@ -462,3 +463,12 @@ def test_who_is_seen_from_his_side_and_drawn_by_half_is_followed_as_a_whole(seed
         if truth.visible is not None and truth.visible_fraction > 0.8:
             right.append(found is not None and found.iou(truth.visible) > 0.4)
     assert np.mean(right) > 0.95
+
+
+@pytest.mark.parametrize('seed', [3, 5, 9, 12])
+def test_a_click_on_the_head_of_one_seen_from_his_side_is_about_all_of_him(seed: int):
+    """It gave the head alone, which his shoulder cuts off."""
+    first = staged(one_seen_from_his_side, seed, 1, FINE)[0]
+    body = first.truth.body
+    box = target_at(first.frame, body.cx, body.y + 0.06 * body.height)
+    assert box.iou(first.truth.visible) > 0.6

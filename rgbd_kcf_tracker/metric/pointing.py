@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,9 +19,18 @@ from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
 from rgbd_kcf_tracker.metric.perceive.figures import find_figures
 from rgbd_kcf_tracker.metric.perceive.floor import FloorFinder
-from rgbd_kcf_tracker.metric.perceive.scene import SceneReader
+from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
+from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import standing, surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import upright
+from rgbd_kcf_tracker.metric.perceive.upright import (
+    HEIGHT,
+    LENGTH,
+    SLIM,
+    SOLID,
+    SPARSE,
+    rounded,
+    upright,
+)
 
 VIEW_WIDTH = 480
 """Columns in which surfaces are looked for: a mug at two metres is still fifteen wide."""
@@ -75,7 +85,7 @@ def target_at(frame: Frame, u: float, v: float) -> Box:
 
 
 def _person_at(frame: Frame, u: float, v: float) -> Box | None:
-    """The outline of the person at a pixel, None where nobody is told from the rest by his shape.
+    """The outline of the person at a pixel, None where nobody is told from the rest.
 
     An arm before somebody, a leg or what he wears may be a surface of its own.
     """
@@ -89,11 +99,25 @@ def _person_at(frame: Frame, u: float, v: float) -> Box | None:
     # Whoever points beside an outline means it, if the room is all that is there.
     large = scene.large[scene.surfaces.labels[at]]
     where = near if (large | ~scene.standing[at]).all() else at
-    for figure in find_figures(scene, np.zeros((0, 2))):
-        shows = figure.seen.in_view(scene.view.shape)[where].any()
-        if shows and upright(figure.seen, scene.view.intrinsics, scene.top(figure.seen)):
-            return outline_box(scene, figure.seen).clipped(frame.width, frame.height)
+    # Who is seen from his side has no such shape, and his shoulder cuts him off from his head.
+    stands = replace(scene, before=scene.standing & ~scene.large[scene.surfaces.labels])
+    for those, is_person in ((scene, _has_shape), (stands, _has_size)):
+        for figure in find_figures(those, np.zeros((0, 2))):
+            seen = figure.seen
+            if seen.in_view(scene.view.shape)[where].any() and is_person(scene, seen):
+                return outline_box(scene, seen).clipped(frame.width, frame.height)
     return None
+
+
+def _has_shape(scene: Scene, seen: Silhouette) -> bool:
+    return upright(seen, scene.view.intrinsics, scene.top(seen))
+
+
+def _has_size(scene: Scene, seen: Silhouette) -> bool:
+    """Whether something has a body's size, fills its box as one, and is as round."""
+    slim = LENGTH[0] <= seen.height <= HEIGHT[1] and seen.width < SLIM * seen.height
+    fill = seen.area / (seen.width * seen.height)
+    return slim and SPARSE < fill < SOLID and rounded(scene.view, seen)
 
 
 def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:
