@@ -821,10 +821,10 @@ def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool):
     view = DepthView(depth, 1, Intrinsics.guess(160, 120))
     seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
     assert rounded(view, seen) is round_
-    assert flat(view, seen, None) is not round_
+    assert flat(view, None, seen) is not round_
     half = np.ones((80, 40), np.bool_)
     half[::2, 1:-1] = False
-    assert not flat(view, Silhouette.of(view, 60, 20, half, 0, Rim()), None), 'as a body fills it'
+    assert not flat(view, None, Silhouette.of(view, 60, 20, half, 0, Rim())), 'as a body fills it'
 
 
 @pytest.mark.parametrize(

@@ -74,4 +74,4 @@ def whole(scene: Scene, sight: Sight) -> bool:
         return False
     if top is not None and top < LEAST_TOP:
         return False
-    return FILL[0] < seen.area / (seen.width * seen.height) < FILL[1]
+    return FILL[0] < seen.fill < FILL[1]

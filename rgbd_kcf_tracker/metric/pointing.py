@@ -116,8 +116,7 @@ def _has_shape(scene: Scene, seen: Silhouette) -> bool:
 def _has_size(scene: Scene, seen: Silhouette) -> bool:
     """Whether something has a body's size, fills its box as one, and is as round."""
     slim = LENGTH[0] <= seen.height <= HEIGHT[1] and seen.width < SLIM * seen.height
-    fill = seen.area / (seen.width * seen.height)
-    return slim and SPARSE < fill < SOLID and rounded(scene.view, seen)
+    return slim and SPARSE < seen.fill < SOLID and rounded(scene.view, seen)
 
 
 def _surface_at(frame: Frame, view: DepthView, u: float, v: float) -> Box:

@@ -66,7 +66,7 @@ def learn_sighting(
         if joined is not None:
             person.joined.add(joined, weight, account.time)
     if index >= 0 and not person.chosen:
-        person.flat.add(float(flat(scene.view, seen, scene.top(seen))), weight, account.time)
+        person.flat.add(flat(scene.view, scene.elevation, seen), weight, account.time)
     if not sure or (scene.since is None and person.gallery.views):
         return
     person.area = max(person.area, seen.area)

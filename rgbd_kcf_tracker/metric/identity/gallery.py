@@ -434,7 +434,7 @@ class Gallery:
         self.looks: Looks | None = None
         self.stature = Stature()
         self._learned: list[_Learned] = []
-        self.largest, self._whole = 0.0, WHOLE_AREA
+        self.largest, self._area_of_all = 0.0, WHOLE_AREA
 
     @property
     def whole(self) -> bool:
@@ -486,7 +486,7 @@ class Gallery:
         if alike is None or math.isnan(alike[0]):
             return odds
         area = min(view.total, self.largest)
-        look = look_log_odds(alike[0], area, views, view.grey, alike[1], self._whole)
+        look = look_log_odds(alike[0], area, views, view.grey, alike[1], self._area_of_all)
         return odds + (max(look, 0.0) if self.mixed else look)
 
     @classmethod
@@ -564,8 +564,8 @@ class Gallery:
         trust = [each.trust for each in learned]
         self.looks = Looks.of(self.views, trust) if learned else None
         self.largest = max((view.total for view in self.views), default=0.0)
-        child = (view.total for view in self.views if view.of_child)
-        self._whole = max(child, default=WHOLE_AREA)
+        small = (view.total for view in self.views if view.of_child)
+        self._area_of_all = max(small, default=WHOLE_AREA)
 
     def _most_redundant(self) -> int:
         """Of those least trusted the one most alike another, the older of two.

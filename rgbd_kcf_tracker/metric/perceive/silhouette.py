@@ -179,6 +179,11 @@ class Silhouette:
         """Metres from top to bottom."""
         return self.metres[3] - self.metres[1]
 
+    @property
+    def fill(self) -> float:
+        """Share of its box that it fills, 0 to 1."""
+        return self.area / (self.width * self.height)
+
     @classmethod
     def of(
         cls, view: DepthView, left: int, top: int, mask: Mask, label: int, rim: Rim

@@ -102,7 +102,7 @@ def _shouldered(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
     """Whether it has shoulders that are broader than its head: somebody seen from the front."""
     if not seen.cut.bottom and seen.width > SLIM * seen.height:
         return False
-    if seen.area < FILL * seen.width * seen.height:
+    if seen.fill < FILL:
         return False
     head, shoulders = _rows(wide, HEAD, per_row), _rows(wide, SHOULDERS, per_row)
     head_width, shoulder_width = float(median(head.tolist())), float(median(shoulders.tolist()))
@@ -148,9 +148,7 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
         near = top is not None and HEADED < top <= TOP[1]
         if near and seen.height > NEAR:
             return True
-    return (
-        LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.area >= FILL * seen.width * seen.height
-    )
+    return LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.fill >= FILL
 
 
 def rounded(view: DepthView, seen: Silhouette) -> bool:
@@ -179,18 +177,18 @@ def child(seen: Silhouette, top: float | None) -> bool:
     """
     if seen.cut.any or top is None or not seen.height > CHILD or top >= GROWN:
         return False
-    return top - seen.height < FEET and seen.area > SPARSE * seen.width * seen.height
+    return top - seen.height < FEET and seen.fill > SPARSE
 
 
-def flat(view: DepthView, seen: Silhouette, top: float | None) -> bool:
+def flat(view: DepthView, elevation: Floats | None, seen: Silhouette) -> bool:
     """Whether a silhouette is a door's leaf, or some readings of a wall, and has no person's shape.
 
-    It is tall and flat, and fills its box as nobody does. ``top`` is as of :func:`upright`.
+    It is tall and flat, and fills its box as nobody does. ``elevation`` is ``(h, w)`` metres above
+    the floor, None where none is known.
     """
-    fill = seen.area / (seen.width * seen.height)
-    if seen.height < LENGTH[1] or SPARSE < fill < SOLID:
+    if seen.height < LENGTH[1] or SPARSE < seen.fill < SOLID or rounded(view, seen):
         return False
-    return not rounded(view, seen) and not upright(seen, view.intrinsics, top)
+    return not upright(seen, view.intrinsics, seen.highest(elevation))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
