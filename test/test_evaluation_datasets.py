@@ -100,6 +100,13 @@ def test_our_layout_starts_where_the_target_is_clearly_in_view(own: Path):
     assert samples[0].body == Box(1, 2, 10, 30)
 
 
+@pytest.mark.parametrize('name', ['visible.txt', 'groundtruth_body.txt', 'timestamps.txt'])
+def test_a_file_that_was_not_fetched_is_not_passed_over(own: Path, name: str):
+    (own / name).unlink(missing_ok=True)
+    (own / name).symlink_to(own / 'elsewhere')
+    assert f'{name} leads to nothing' in error_of(own)
+
+
 @pytest.mark.parametrize('share', ['-0.1', '1.01', '1000', 'nan'])
 def test_a_visible_share_that_cannot_be_is_named(own: Path, share: str):
     (own / 'visible.txt').write_text(f'1\n{share}\n0\n1\n')

@@ -17,7 +17,7 @@ import pytest
 
 import rgbd_kcf_tracker
 from rgbd_kcf_tracker.cli.main import main
-from rgbd_kcf_tracker.errors import DatasetError
+from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
 from rgbd_kcf_tracker.evaluation.datasets import DatasetOptions, open_dataset
 from rgbd_kcf_tracker.evaluation.everyone import follow
 from rgbd_kcf_tracker.evaluation.metrics.everyone import ALPHAS, mean, overlaps, score
@@ -315,6 +315,14 @@ def test_a_recording_with_mot_text(pair: Path):
     assert [p.counts for p in samples[2].people] == [True, False]
     assert [len(s.people) for s in samples] == [2, 2, 2, 2, 1, 1, 2, 2]
     assert [s.number for s in samples] == list(range(8))
+
+
+@pytest.mark.parametrize('name', ['mot.txt', 'seqinfo.ini'])
+def test_a_file_that_was_not_fetched_is_not_passed_over(pair: Path, name: str):
+    (pair / name).unlink(missing_ok=True)
+    (pair / name).symlink_to(pair / 'elsewhere')
+    with pytest.raises(RgbdKcfError, match=f'{name} leads to nothing'):
+        opened(pair)
 
 
 def test_a_depth_image_that_is_missing_makes_a_frame_without_as_for_one_target(pair: Path):

@@ -181,6 +181,26 @@ def test_depth_of_eight_bits_is_no_depth(tmp_path: Path) -> None:
         list(recording.frames())
 
 
+def test_damage_to_a_depth_image_is_not_taken_for_another_form(tmp_path: Path) -> None:
+    """A message's RVL has no mark of its own, so that any bytes could be it; no file is."""
+    folder(tmp_path)
+    path = tmp_path / 'depth' / '000002.png'
+    path.write_bytes(b'\0' + path.read_bytes()[1:])
+    with open_recording(tmp_path) as recording:
+        assert [f.depth is None for f in recording.frames()] == [False, True, False]
+        (warning,) = recording.warnings
+    assert '000002.png' in warning
+    assert 'neither JPEG, PNG nor TIFF' in warning
+
+
+@pytest.mark.parametrize('name', ['timestamps.txt', 'groundtruth.txt', 'camera_info.json'])
+def test_a_file_that_was_not_fetched_is_not_guessed(name: str, tmp_path: Path) -> None:
+    """A link that leads to nothing, as of a file that is kept elsewhere."""
+    (folder(tmp_path) / name).symlink_to(tmp_path / 'elsewhere' / name)
+    with pytest.raises(RecordingError, match=f'{name} leads to nothing: it is a link'):
+        open_recording(tmp_path)
+
+
 def test_no_images(tmp_path: Path) -> None:
     (tmp_path / 'rgb').mkdir()
     with pytest.raises(RecordingError, match='holds no images'):

@@ -24,6 +24,8 @@ MAX_TEXT = 1 << 28
 MAX_IMAGE = 1 << 29
 """Largest image file that is read, in bytes: more than the largest image takes unpacked."""
 
+NO_NAME = 'is no name of a file: a zero byte is in it'
+
 _KINDS = (
     (stat.S_ISFIFO, 'a named pipe'),
     (stat.S_ISSOCK, 'a socket'),
@@ -76,6 +78,15 @@ def open_file(path: Path) -> FileIO:
         file.close()
         raise
     return file
+
+
+def is_there(path: Path) -> bool:
+    """Whether a folder names this file, so that it is read or refused, and not passed over.
+
+    A link that leads to nothing counts: what stands for the file was not fetched, or its disk is
+    not there, and what it would say is not to be guessed.
+    """
+    return os.path.lexists(path)
 
 
 def read_file(path: Path, most: int) -> bytes:
@@ -154,6 +165,8 @@ def _stat(path: Path) -> os.stat_result:
         raise RecordingError(f'{path} {missing}') from None
     except OSError as error:
         raise RecordingError(cannot_read(path, error)) from None
+    except ValueError:
+        raise RecordingError(f'{path} {NO_NAME}') from None
 
 
 def _require_file(path: Path, mode: int) -> None:

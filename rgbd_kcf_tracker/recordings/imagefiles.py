@@ -12,9 +12,17 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.recordings.containers import MAX_PIXELS, MAX_SIDE, Container, inspect
+from rgbd_kcf_tracker.recordings.containers import (
+    MAX_PIXELS,
+    MAX_SIDE,
+    PNG,
+    Container,
+    inspect,
+    sniff,
+)
 from rgbd_kcf_tracker.recordings.files import MAX_IMAGE, listing, read_file
 from rgbd_kcf_tracker.recordings.images import (
+    COMPRESSED_DEPTH_HEADER,
     DepthImage,
     EncodingError,
     Refused,
@@ -113,7 +121,12 @@ def metres(data: memoryview, max_pixels: int, refused: Refused | None = None) ->
 
     Returns:
         ``(H, W)`` float32 metres, NaN where there is no reading.
+
+    Raises:
+        ImageError: where it is no image, or one of a kind that is not depth.
     """
+    if not sniff(data) and sniff(data[COMPRESSED_DEPTH_HEADER.size :]) != PNG:
+        inspect(data, max_pixels)  # no file: else damage would be read as RVL, which has no mark
     return decode_depth_bytes(data, max_pixels=max_pixels, refused=refused)
 
 

@@ -64,7 +64,7 @@ COLOR_ENCODINGS = tuple(_COLOR_ENCODINGS)
 DEPTH_ENCODINGS = tuple(_DEPTH_ENCODINGS)
 
 _MILLIMETRE = np.float32(0.001)
-_COMPRESSED_DEPTH_HEADER = struct.Struct('<iff')
+COMPRESSED_DEPTH_HEADER = struct.Struct('<iff')
 
 
 class EncodingError(ImageError):
@@ -246,10 +246,10 @@ def decode_depth_bytes(
         raise EncodingError('depth is JPEG, which spoils it: record compressedDepth or raw depth')
     if kind in (PNG, TIFF):
         return _bare_depth(data, max_pixels, refused)
-    if len(data) <= _COMPRESSED_DEPTH_HEADER.size:
+    if len(data) <= COMPRESSED_DEPTH_HEADER.size:
         raise ImageError(f'compressed depth has only {len(data)} bytes: it is cut off')
-    _, a, b = _COMPRESSED_DEPTH_HEADER.unpack_from(data)
-    body = data[_COMPRESSED_DEPTH_HEADER.size :]
+    _, a, b = COMPRESSED_DEPTH_HEADER.unpack_from(data)
+    body = data[COMPRESSED_DEPTH_HEADER.size :]
     if sniff(body) == PNG:
         values = _decode_png16(body, max_pixels)
     elif 'rvl' in text.lower() or 'png' not in text.lower():

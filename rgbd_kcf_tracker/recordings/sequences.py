@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
@@ -14,6 +13,7 @@ from pathlib import Path
 from rgbd_kcf_tracker.errors import ImageError, RecordingError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
+from rgbd_kcf_tracker.recordings.files import is_there
 from rgbd_kcf_tracker.recordings.imagefiles import (
     ImageFrames,
     depths_beside,
@@ -66,7 +66,7 @@ def folder_depths(
     """
     folder = path / DEPTH_FOLDER
     if not folder.is_dir():
-        if os.path.lexists(folder):
+        if is_there(folder):
             warn(f'{folder} is no folder of images: read as colour alone')
         return ()
     depths = depths_beside(colors, folder)
@@ -90,7 +90,7 @@ def folder_stamps(
         RecordingError: where its lines are not those of the images.
     """
     path = path / 'timestamps.txt'
-    if not path.exists():
+    if not is_there(path):
         return even_stamps(len(colors), fps)
     if lost := unnumbered(colors):
         raise RecordingError(f'{lost}: which line of {path} is its? Number it, or take it out')
@@ -182,7 +182,7 @@ class SequenceFolder(Closing):
         truth, warnings = self.groundtruth, list(self.warnings)
         shown = None if truth is None else sum(box is not None for box in truth)
         several = self.path / MOT_FILE
-        if truth is None and several.is_file():
+        if truth is None and is_there(several):
             try:
                 rows = read_mot(several, len(self), regions=True)
                 streams.append(StreamInfo(MOT_FILE, 'people', len(rows.ids), role='truth'))
@@ -207,7 +207,7 @@ class SequenceFolder(Closing):
 
     def _read_truth(self, name: str) -> list[Box | None] | None:
         path = self.path / name
-        if not path.exists():
+        if not is_there(path):
             return None
         boxes = read_boxes(path)
         if fault := self._out_of_step(len(boxes)):

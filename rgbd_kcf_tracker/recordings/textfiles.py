@@ -16,7 +16,7 @@ from typing import Any
 from rgbd_kcf_tracker.errors import RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.recordings.camera_info import NO, YES, camera_from_info
-from rgbd_kcf_tracker.recordings.files import read_text
+from rgbd_kcf_tracker.recordings.files import is_there, read_text
 from rgbd_kcf_tracker.recordings.messages import LARGEST
 from rgbd_kcf_tracker.recordings.storage import NANOSECONDS
 
@@ -200,10 +200,10 @@ def folder_intrinsics(
     Raises:
         RecordingError: where a file holds no camera.
     """
-    if (folder / INTRINSICS).exists():
+    if is_there(folder / INTRINSICS):
         return read_intrinsics(folder / INTRINSICS)
     path = folder / CAMERA_INFO
-    if not path.exists():
+    if not is_there(path):
         return None
     text = read_text(path)
     try:

@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.evaluation.datasets.folder import (
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, with_truth
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.files import is_there, read_text
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, image_files
 from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE, MOT_FILE, read_mot
 from rgbd_kcf_tracker.recordings.textfiles import CAMERA_INFO, INTRINSICS, read_boxes
@@ -146,7 +147,7 @@ def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> Pe
         boxes = read_boxes(path)
         check_lengths(path, len(boxes), images, folder)
         shares: list[float] | None = None
-        if _share_file(path).is_file():
+        if is_there(_share_file(path)):
             shares = read_fractions(_share_file(path))
             check_lengths(_share_file(path), len(shares), images, folder)
         for frame, box in enumerate(boxes):
@@ -159,7 +160,7 @@ def _from_files(paths: list[Path], images: tuple[Path, ...], folder: Path) -> Pe
 
 def _bodies(path: Path, images: tuple[Path, ...], folder: Path) -> list[Box | None]:
     """The whole body in each frame; None where it is not known."""
-    if not path.is_file():
+    if not is_there(path):
         return [None] * len(images)
     boxes = read_boxes(path)
     check_lengths(path, len(boxes), images, folder)
@@ -173,7 +174,7 @@ def image_folder(path: Path) -> Path | None:
 
 def _truth_files(path: Path) -> list[Path]:
     for name in (path / MOT_FILE, path / CHALLENGE_FILE):
-        if name.is_file():
+        if is_there(name):
             return [name]
     return people_files(path)
 
@@ -184,13 +185,14 @@ def _share_file(path: Path) -> Path:
 
 def _challenge_rate(path: Path) -> float | None:
     """Frames per second as the challenge's ``seqinfo.ini`` states them."""
-    if not (path / _INFO).is_file():
+    if not is_there(path / _INFO):
         return None
+    text = read_text(path / _INFO)
     info = configparser.ConfigParser(interpolation=None)
     try:
-        info.read(path / _INFO, encoding='utf-8')
+        info.read_string(text)
         rate = info.getfloat('Sequence', 'frameRate')
-    except (OSError, ValueError, configparser.Error) as error:
+    except (ValueError, configparser.Error) as error:
         raise DatasetError(f'{path / _INFO}: no frameRate in [Sequence] ({error})') from None
     if not 0 < rate < 1e6:
         raise DatasetError(f'{path / _INFO}: frameRate is {rate:g}: give frames per second')

@@ -33,6 +33,7 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
     with_truth,
 )
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.files import is_there
 from rgbd_kcf_tracker.recordings.imagefiles import (
     ImageFrames,
     image_files,
@@ -189,13 +190,13 @@ def load(path: Path, truth_path: Path, visible_path: Path, person: bool, fps: fl
         RecordingError: for a file that cannot be read or a line that is no box.
     """
     images = image_files(_colors(path))
-    if not truth_path.exists():
+    if not is_there(truth_path):
         raise DatasetError(f'{path} has no {truth_path.name}: nothing to measure against')
     boxes = read_boxes(truth_path)
     check_lengths(truth_path, len(boxes), images, images[0].parent)
     body = _read_bodies(_body_file(truth_path) if person else path / _BODY, images)
     fractions = None
-    if visible_path.exists():
+    if is_there(visible_path):
         fractions = read_fractions(visible_path)
         check_lengths(visible_path, len(fractions), images, images[0].parent)
 
@@ -231,7 +232,7 @@ def _body_file(truth_path: Path) -> Path:
 
 def _read_bodies(path: Path, images: tuple[Path, ...]) -> list[Box | None] | None:
     """The whole body in each frame; None where there is no such file."""
-    if not path.exists():
+    if not is_there(path):
         return None
     bodies = read_boxes(path)
     check_lengths(path, len(bodies), images, images[0].parent)

@@ -25,6 +25,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import Opened, Sequence
 from rgbd_kcf_tracker.evaluation.datasets.images import check_lengths, princeton_depth, with_truth
 from rgbd_kcf_tracker.evaluation.metrics.princeton import CATEGORIES
 from rgbd_kcf_tracker.geometry import Intrinsics
+from rgbd_kcf_tracker.recordings.files import is_there
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames
 from rgbd_kcf_tracker.recordings.textfiles import read_boxes, read_lines
 
@@ -66,7 +67,7 @@ def read_categories(path: Path) -> dict[str, dict[str, str]]:
     Raises:
         DatasetError: naming the line where a split is missing or no category of it.
     """
-    if not path.is_file():
+    if not is_there(path):
         return {}
     result: dict[str, dict[str, str]] = {}
     for number, row in enumerate(csv.DictReader(read_lines(path)), start=2):
@@ -95,11 +96,11 @@ def load(path: Path) -> Opened:
             raise DatasetError(f'{file} is missing: {_mat(path)} names it')
     count = len(frames.colors)
     truth_path, init_path = path / f'{path.name}.txt', path / 'init.txt'
-    if truth_path.is_file():
+    if is_there(truth_path):
         boxes = read_boxes(truth_path, _FLAGS)
         check_lengths(truth_path, len(boxes), frames.colors, folders)
         annotated = True
-    elif init_path.is_file():
+    elif is_there(init_path):
         first = read_boxes(init_path, _FLAGS)
         boxes = [*first[:1], *[None] * (count - 1)]
         annotated = False

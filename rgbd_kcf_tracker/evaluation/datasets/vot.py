@@ -24,6 +24,7 @@ from rgbd_kcf_tracker.evaluation.datasets.images import (
     with_truth,
 )
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.files import is_there
 from rgbd_kcf_tracker.recordings.imagefiles import ImageFrames, even_stamps, image_files
 from rgbd_kcf_tracker.recordings.messages import LARGEST
 from rgbd_kcf_tracker.recordings.recording import MAX_FPS, MIN_FPS
@@ -144,7 +145,7 @@ def _mask_bounds(values: list[int]) -> Box | None:
 
 
 def _settings(path: Path) -> dict[str, str]:
-    if not path.is_file():
+    if not is_there(path):
         return {}
     pairs = (line.split('=', 1) for line in read_lines(path) if '=' in line)
     return {key.strip(): value.strip() for key, value in pairs}
