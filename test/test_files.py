@@ -91,6 +91,14 @@ def test_what_is_no_file_is_refused_and_not_waited_for(
     assert list((tmp_path / 'out').iterdir()) == []
 
 
+def test_a_zero_byte_is_in_no_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No shell can pass one, but programs and files of parameters can."""
+    with pytest.raises(RecordingError, match='no name of a file'):
+        open_recording('a\0b')
+    source = write_folder(tmp_path / 'source')
+    assert 'no name of a file' in refused(capsys, 'track', source, '--output', 'a\0b.csv')
+
+
 @pytest.mark.parametrize(
     'name',
     ['rgb/000002.png', 'depth/000002.png', 'groundtruth.txt', 'timestamps.txt', 'intrinsics.json'],

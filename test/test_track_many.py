@@ -235,6 +235,7 @@ def test_names_tell_recordings_apart():
     assert names(['/d/日本.mcap', '/d/中国.mcap']) == ['日本', '中国']
     with pytest.raises(ParameterError, match='rename one'):
         names(['/d/a b', '/d/a_b'])
+    assert names(['/', '/d/a.mcap', '/.mcap']) == ['recording', 'a', 'mcap']
 
 
 def contents(*folders: Path) -> dict[Path, bytes]:

@@ -243,7 +243,8 @@ def _names(sources: Sequence[str]) -> list[str]:
     """A short name for each: the last part of its path, and as many more as tell it apart."""
     from rgbd_kcf_tracker.evaluation.store import slug
 
-    parts = [Path(source).with_suffix('').parts[1:] or ('recording',) for source in sources]
+    places = [Path(source) for source in sources]
+    parts = [p.with_name(p.stem).parts[1:] if p.name else ('recording',) for p in places]
     names = ['' for _ in parts]
     for length in range(1, max(map(len, parts)) + 1):
         taken = [slug('_'.join(own[-length:])) for own in parts]

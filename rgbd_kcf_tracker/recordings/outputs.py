@@ -29,7 +29,7 @@ from types import TracebackType
 from typing import BinaryIO, TypeVar
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.files import kind_of, walk, why
+from rgbd_kcf_tracker.recordings.files import NO_NAME, kind_of, walk, why
 
 T = TypeVar('T')
 W = TypeVar('W', bound='FrameWriter')
@@ -432,8 +432,15 @@ def cannot_write(path: object, error: OSError) -> str:
 
 
 def _target(path: Path) -> Path:
-    """The path with its links followed, so that a link is not replaced but what it stands for."""
-    return Path(os.path.realpath(path))
+    """The path with its links followed, so that a link is not replaced but what it stands for.
+
+    Raises:
+        RecordingError: where no file can have this name.
+    """
+    try:
+        return Path(os.path.realpath(path))
+    except ValueError:
+        raise RecordingError(f'{path} {NO_NAME}') from None
 
 
 def _check_place(path: Path, target: Path) -> None:
