@@ -272,6 +272,20 @@ def test_a_sweep_from_the_command_line(tmp_path: Path, capsys):
         assert (tmp_path / 's' / name).read_bytes() == (report / name).read_bytes()
 
 
+def test_where_every_run_fails_the_reason_is_told(tmp_path: Path, capsys):
+    """It named a file of failures that is only written with the report."""
+    data = tmp_path / 'data'
+    assert main(['simulate', str(data), '--count', '2', *SMALL[:-2]]) == 0
+    for image in data.glob('*/rgb/000002.png'):
+        image.write_bytes(b'')
+    words = ['sweep', str(data), '--report', str(tmp_path / 'out'), '--jobs', '1']
+    assert main([*words, '--variant', 'kcf', '--param', 'padding=1:2:2']) == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert 'nothing was measured: normal_' in error
+    assert '000002.png' in error
+    assert not (tmp_path / 'out').exists()
+
+
 def test_the_report_is_not_written_into_data_that_are_held_out(tmp_path: Path, capsys):
     held = tmp_path / 'held'
     (held / 'rgb').mkdir(parents=True)

@@ -134,7 +134,9 @@ def run(args: argparse.Namespace) -> int:
         tried, _, failures = run_jobs(args, tried, [s.contender for s in every], options)
         if interrupts.asked:  # nothing can be said before all settings have run
             return end(failures)
-        scores, tried_of = sweep_tables.scores(args.report, tried, every, options, args.measure)
+        scores, tried_of = sweep_tables.scores(
+            args.report, tried, every, options, args.measure, failures
+        )
         sign = -1.0 if args.measure in sweep_tables.SMALLER_IS_BETTER else 1.0
         finalists = sweep_tables.best(scores, args.finalists, sign)
         last = [default, *(settings[i] for i in finalists)]
@@ -151,7 +153,7 @@ def run(args: argparse.Namespace) -> int:
             scores,
             tried_of,
             finalists,
-            *sweep_tables.scores(args.report, held, last, options, args.measure),
+            *sweep_tables.scores(args.report, held, last, options, args.measure, more),
         )
         words = f'{in_words(args)}; {args.search} search, seed {args.seed}'
         heading = Heading((*args.dataset, f'held out: {args.held_out}'), words)

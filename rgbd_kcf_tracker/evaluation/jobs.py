@@ -83,6 +83,14 @@ class Failure:
     reason: str
 
 
+def why_nothing(failures: Items[Failure]) -> str:
+    """Why a run measured nothing, in words."""
+    if failures:
+        each = dict.fromkeys(f'{f.sequence}: {f.reason}' for f in failures)
+        return f'nothing was measured: {"; ".join(each)}'
+    return 'nothing was measured: none of the sequences has ground truth'
+
+
 @dataclass(frozen=True, slots=True)
 class Job:
     """One sequence and the trackers that have not run on it yet.

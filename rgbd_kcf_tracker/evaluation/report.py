@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.evaluation.contenders import Contender
 from rgbd_kcf_tracker.evaluation.datasets.base import EVERYONE
 from rgbd_kcf_tracker.evaluation.everyone import EveryoneResult
 from rgbd_kcf_tracker.evaluation.identity import Pairs
-from rgbd_kcf_tracker.evaluation.jobs import Failure
+from rgbd_kcf_tracker.evaluation.jobs import Failure, why_nothing
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.perframe import Collected, read_per_frame, write_per_frame
 from rgbd_kcf_tracker.evaluation.place_tables import places_table
@@ -78,7 +78,7 @@ def write_report(
     measured = Measured(read_per_frame(folder / PER_FRAME), collected.infos)
     _write_failures(folder / 'failures.txt', failures)
     if not measured.results:
-        raise DatasetError(_why_nothing(failures))
+        raise DatasetError(why_nothing(failures))
     if not any(len(result.counted.said) for result in measured.results):
         raise DatasetError(
             'nothing was measured: there is no frame to judge after the first, in which the '
@@ -154,7 +154,7 @@ def write_everyone_report(
     """
     _write_failures(folder / 'failures.txt', failures)
     if not results:
-        raise DatasetError(_why_nothing(failures))
+        raise DatasetError(why_nothing(failures))
     every = [everyone_tables.overview(results), everyone_tables.by_recording(results)]
     _write_tables(folder, every)
     numbers = _numbers(every, contenders, failures, heading) | {
@@ -183,7 +183,7 @@ def write_identity_report(
     _write_failures(folder / 'failures.txt', failures)
     if not any(len(p.probability) for p in pairs):
         raise DatasetError(
-            _why_nothing(failures) if failures else 'no two sightings could be compared'
+            why_nothing(failures) if failures else 'no two sightings could be compared'
         )
     calibration, reliabilities = identity_tables.calibration(pairs)
     every = [identity_tables.overview(pairs), calibration]
@@ -333,10 +333,3 @@ def _write_failures(path: Path, failures: Sequence[Failure]) -> None:
         return
     lines = [f'{f.sequence} {f.tracker}'.strip() + f': {f.reason}' for f in failures]
     write_atomically(path, '\n\n'.join(lines) + '\n')
-
-
-def _why_nothing(failures: Sequence[Failure]) -> str:
-    if failures:
-        each = dict.fromkeys(f'{f.sequence}: {f.reason}' for f in failures)
-        return f'nothing was measured: {"; ".join(each)}'
-    return 'nothing was measured: none of the sequences has ground truth'

@@ -17,7 +17,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.errors import DatasetError
 from rgbd_kcf_tracker.evaluation.datasets.base import Sequence
-from rgbd_kcf_tracker.evaluation.jobs import RunOptions, truth_key, truth_path
+from rgbd_kcf_tracker.evaluation.jobs import Failure, RunOptions, truth_key, truth_path, why_nothing
 from rgbd_kcf_tracker.evaluation.measured import Measured
 from rgbd_kcf_tracker.evaluation.metrics import sensitivity
 from rgbd_kcf_tracker.evaluation.metrics.sensitivity import Labels
@@ -80,27 +80,39 @@ def scores(
     settings: Items[Setting],
     options: RunOptions,
     measure: str,
+    failures: Items[Failure] = (),
 ) -> tuple[FloatArray, Labels]:
     """What settings scored on sequences, from what their runs left.
+
+    Args:
+        folder: of the report.
+        sequences: that were run.
+        settings: that were run, the default first.
+        options: of the runs.
+        measure: which one is asked for.
+        failures: of the runs: what is told where nothing was measured.
 
     Returns:
         ``(S, Q)`` scores, NaN where one failed, and ``(Q,)`` which recording each sequence is of.
 
     Raises:
-        DatasetError: where no sequence has the measure.
+        DatasetError: where nothing was measured, or no sequence has the measure.
     """
-    rows = []
+    rows, measured_any = [], []
     for one in settings:
         collected = collect(folder, sequences, [one.contender], options)
         measured = Measured(collected.results, collected.infos)
         own = [measured.of(one.contender.name, s.name) for s in sequences]
+        measured_any.append(any(m is not None for m in own))
         rows.append([math.nan if m is None else float(getattr(m, measure)) for m in own])
     table = np.array(rows, np.float64).reshape(len(settings), len(sequences))
     kept = ~np.isnan(table[0])  # the default says where there is such a measure
     if not kept.any():
+        default = settings[0].contender.name
         raise DatasetError(
-            f'no sequence has {measure} of {settings[0].contender.name}: choose another --measure, '
-            'or see failures.txt'
+            f'no sequence has {measure} of {default}: choose another --measure'
+            if measured_any[0]
+            else why_nothing([f for f in failures if f.tracker in ('', default)])
         )
     return table[:, kept], sensitivity.numbered([s.recording for s in sequences])[kept]
 
