@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
 import os
 import re
@@ -37,6 +38,7 @@ from rgbd_kcf_tracker.recordings import (
     VideoWriter,
     draw_track,
     open_recording,
+    video,
 )
 from rgbd_kcf_tracker.recordings.encoding import millimetres
 from rgbd_kcf_tracker.recordings.messages import tracks_of_state
@@ -426,6 +428,18 @@ def test_video_without_ffmpeg_says_what_to_install(
     with pytest.raises(MissingExtraError, match=r'rgbd_kcf_tracker\[video\].*apt install ffmpeg'):
         VideoWriter(tmp_path / 'a.mp4')
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_of_which_ffmpeg_says_nothing_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / 'ffmpeg'
+    program.write_text(f'#!/bin/sh\nexit {256 - errno.ENOSPC}\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(video, '_ffmpeg', lambda _: os.fspath(program))
+    writer = VideoWriter(tmp_path / 'a.mp4')
+    with pytest.raises(RecordingError, match=r'a\.mp4 cannot be written: .*No space left'), writer:
+        writer.write(np.zeros((48, 64, 3), np.uint8))
 
 
 @pytest.mark.parametrize('size', [(320, 240), (640, 360), (640, 480)])

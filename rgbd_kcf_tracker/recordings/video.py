@@ -39,6 +39,8 @@ SUFFIXES = ('.mp4', '.m4v', '.mov', '.mkv')
 
 _SMALLEST_WIDTH, _LARGEST_HEIGHT = 640, 4096
 _QUIET = ['-hide_banner', '-loglevel', 'error', '-y']
+_DISK_ERRORS = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO})
+"""Which ffmpeg may not put into words, but ends with, as 256 less their number."""
 # In pieces of a second, each complete in itself: a full disk or a kill loses the last one alone.
 _IN_PIECES = ['-movflags', '+empty_moov+default_base_moof', '-frag_duration', '1000000']
 _IN_ONE = ['-c', 'copy', '-movflags', '+faststart']
@@ -190,6 +192,8 @@ class VideoWriter(FrameWriter):
         said = lines[0].rpartition('] ')[2] if lines else ''
         if code == -signal.SIGXFSZ:
             said = os.strerror(errno.EFBIG)
+        elif not said and 256 - code in _DISK_ERRORS:
+            said = os.strerror(256 - code)
         return f'{self.path} cannot be written: ffmpeg says {said or f"nothing ({code})"!r}'
 
 
