@@ -420,7 +420,7 @@ def refused(where: str, **more) -> str:
 def test_no_scheduler(tmp_path: Path, capsys):
     assert 'no Dask scheduler answers at tcp://127.0.0.1:9' in refused('tcp://127.0.0.1:9')
     assert 'no Dask scheduler answers at localhost:x' in refused('localhost:x')
-    assert 'none.json cannot be read' in refused(str(tmp_path / 'none.json'))
+    assert 'none.json does not exist' in refused(str(tmp_path / 'none.json'))
     (tmp_path / 'some.json').write_text('{}')
     assert 'is no scheduler file' in refused(str(tmp_path / 'some.json'))
     words = [*SCENES, '--cluster', str(tmp_path / 'none.json'), '--report', str(tmp_path / 'r')]

@@ -132,6 +132,31 @@ def test_a_pipe_in_a_bag_is_named(
     assert 'is a named pipe' in refused(capsys, 'info', source)
 
 
+@pytest.mark.parametrize('name', ['runs.jsonl', 'results/kcf/source.json'])
+def test_a_pipe_in_a_report_is_not_waited_for(name: str, tmp_path: Path) -> None:
+    words = ['evaluate', str(write_folder(tmp_path / 'source')), '--variants', 'kcf', '--jobs', '1']
+    words += ['--report', str(tmp_path / 'report')]
+    assert main(words) == 0
+    path = tmp_path / 'report' / name
+    path.unlink()
+    os.mkfifo(path)
+    code = main(words)
+    assert code == (2 if name == 'runs.jsonl' else 0)
+    assert path.is_fifo() == bool(code), 'a result is made anew'
+
+
+@pytest.mark.parametrize('text', ['[' * 100_000, '[]', '\0', ''])
+def test_what_a_run_noted_may_be_damaged(text: str, tmp_path: Path) -> None:
+    words = ['track', str(write_folder(tmp_path / 'source')), '--jobs', '1', *INIT]
+    words += ['--variant', 'kcf', '--output', str(tmp_path / 'out')]
+    assert main(words) == 0
+    note = tmp_path / 'out' / '.done' / 'source.json'
+    kept = note.read_text()
+    note.write_text(text)
+    assert main([*words, '--overwrite']) == 0
+    assert note.read_text() == kept
+
+
 def test_files_larger_than_can_be_are_not_read(
     tmp_path: Path,
 ) -> None:

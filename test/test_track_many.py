@@ -371,7 +371,7 @@ def test_names_that_are_no_utf8(recordings: Path, tmp_path: Path):
         (['normal_*', '--output', 'o', '--param', 'padding=x'], 'padding'),
         (['normal_*', '--output', 'o', '--init', '1,2'], 'is no box'),
         (['normal_*', '--output', 'o', '--shard', '3/2'], '--shard 3/2'),
-        (['normal_*', '--output', 'o', '--cluster', 'none.json'], 'none.json cannot be read'),
+        (['normal_*', '--output', 'o', '--cluster', 'none.json'], 'none.json does not exist'),
         (['normal_*', '--output', 'o', '--jobs', '0', '--mot', 'o2'], '--jobs is 0'),
         (['normal_0', '--output', 'o.csv', '--jobs', '4'], '--output o.csv would be a folder'),
     ],

@@ -23,8 +23,9 @@ from typing import Any, TypeVar
 
 from rgbd_kcf_tracker.batch.environment import Environment, environment
 from rgbd_kcf_tracker.batch.workers import Workers
-from rgbd_kcf_tracker.errors import WorkersError
+from rgbd_kcf_tracker.errors import RecordingError, WorkersError
 from rgbd_kcf_tracker.extras import require
+from rgbd_kcf_tracker.recordings.files import read_text
 
 T = TypeVar('T')
 R = TypeVar('R')
@@ -240,13 +241,13 @@ def _address(where: str) -> str:
     if '://' in where or (not path.exists() and ':' in where and os.sep not in where):
         return where
     try:
-        return str(json.loads(path.read_text(encoding='utf-8'))['address'])
-    except OSError as error:
+        return str(json.loads(read_text(path))['address'])
+    except RecordingError as error:
         raise WorkersError(
-            f'{where} cannot be read ({error.strerror or error}): give tcp://HOST:PORT, or the '
-            "file that 'dask scheduler --scheduler-file' wrote"
+            f'{error}: give tcp://HOST:PORT, or the file that '
+            "'dask scheduler --scheduler-file' wrote"
         ) from None
-    except (ValueError, KeyError, TypeError):
+    except (RecursionError, ValueError, KeyError, TypeError):
         raise WorkersError(
             f"{where} is no scheduler file: give the one that 'dask scheduler --scheduler-file' "
             'wrote'

@@ -19,7 +19,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rgbd_kcf_tracker.errors import RecordingError
-from rgbd_kcf_tracker.recordings.files import walk
+from rgbd_kcf_tracker.recordings.files import read_text, walk
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 
 MISSING = '-'
@@ -113,9 +113,9 @@ class _Cache:
 
     def read(self) -> str | None:
         try:
-            kept = json.loads(self._path.read_text(encoding='utf-8'))
+            kept = json.loads(read_text(self._path))
             return str(kept['digest']) if kept['state'] == self._state else None
-        except (OSError, ValueError, KeyError, TypeError):
+        except (RecordingError, RecursionError, ValueError, KeyError, TypeError):
             return None
 
     def write(self, digest: str) -> None:

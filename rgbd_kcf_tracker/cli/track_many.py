@@ -363,10 +363,12 @@ def _is_done(folder: Path, job: TrackJob) -> bool:
 
 def _kept(folder: Path, job: TrackJob) -> dict[str, Any]:
     """What is known of a recording that was done, nothing where it was not."""
+    from rgbd_kcf_tracker.recordings.files import read_text
+
     try:
-        kept = json.loads(_done_path(folder, job).read_text(encoding='utf-8'))
+        kept = json.loads(read_text(_done_path(folder, job)))
         return kept if isinstance(kept, dict) else {}
-    except (OSError, ValueError):
+    except (RecordingError, RecursionError, ValueError):
         return {}
 
 
@@ -427,10 +429,12 @@ def _refuse_to_replace(
 
 def _names_in(sources: Path) -> set[str]:
     """The recordings in a table of them; '' among them where it is none."""
+    from rgbd_kcf_tracker.recordings.files import open_text
+
     try:
-        with sources.open(encoding='utf-8', newline='') as file:
+        with open_text(sources) as file:
             return {row.get('name') or '' for row in csv.DictReader(file)}
-    except (OSError, ValueError, csv.Error):
+    except (OSError, RecordingError, ValueError, csv.Error):
         return {''}
 
 

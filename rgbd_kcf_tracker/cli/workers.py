@@ -145,6 +145,7 @@ class Progress:
 def record(folder: Path, workers: str, **more: object) -> None:
     """Note in the folder what was run when, where and with what; the report tells only results."""
     from rgbd_kcf_tracker.batch.environment import environment
+    from rgbd_kcf_tracker.recordings.files import refuse_special
 
     own = environment()
     line = {
@@ -158,6 +159,7 @@ def record(folder: Path, workers: str, **more: object) -> None:
         **more,
     }
     path = folder / RECORD
+    refuse_special(path)
     try:
         with path.open('a', encoding='utf-8') as file:
             file.write(json.dumps(line) + '\n')

@@ -24,8 +24,9 @@ from typing import Any
 import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
-from rgbd_kcf_tracker.errors import DatasetError, RgbdKcfError
+from rgbd_kcf_tracker.errors import DatasetError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.recordings.files import cannot_read, open_text, read_text
 from rgbd_kcf_tracker.recordings.outputs import write_atomically
 from rgbd_kcf_tracker.recordings.results import HEADER
 from rgbd_kcf_tracker.recordings.results import row as track_row
@@ -104,9 +105,9 @@ def read_json(path: Path) -> dict[str, Any]:
         DatasetError: where it cannot be read.
     """
     try:
-        value = json.loads(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+        value = json.loads(read_text(path))
+    except RecordingError as error:
+        raise DatasetError(str(error)) from None
     except (RecursionError, ValueError):
         raise DatasetError(f'{path} is no JSON') from None
     if not isinstance(value, dict):
@@ -198,14 +199,14 @@ def _csv(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 def _rows(path: Path, needed: Sequence[str]) -> list[dict[str, str]]:
     try:
-        with path.open(encoding='utf-8', newline='') as file:
+        with open_text(path) as file:
             reader = csv.DictReader(file)
             missing = [name for name in needed if name not in (reader.fieldnames or ())]
             if missing:
                 raise DatasetError(f'{path}, line 1: the header lacks {", ".join(missing)}')
             return list(reader)
     except OSError as error:
-        raise DatasetError(f'{path} cannot be read: {error.strerror or error}') from None
+        raise DatasetError(cannot_read(path, error)) from None
     except (UnicodeDecodeError, csv.Error) as error:
         raise DatasetError(f'{path} is no CSV: {error}') from None
 

@@ -10,6 +10,7 @@ opened here, and is refused where it is neither a file nor a folder.
 from __future__ import annotations
 
 import errno
+import io
 import os
 import stat
 from collections.abc import Iterator
@@ -114,6 +115,15 @@ def read_file(path: Path, most: int) -> bytes:
     return parts[0] if len(parts) == 1 else b''.join(parts)
 
 
+def open_text(path: Path) -> io.TextIOWrapper:
+    """A regular text file in UTF-8 to read line by line, its line ends as they are.
+
+    Raises:
+        RecordingError: where it cannot be opened or is no regular file.
+    """
+    return io.TextIOWrapper(io.BufferedReader(open_file(path)), encoding='utf-8', newline='')
+
+
 def read_text(path: Path) -> str:
     """A text file in UTF-8, with or without a byte-order mark.
 
@@ -167,6 +177,16 @@ def _stat(path: Path) -> os.stat_result:
         raise RecordingError(cannot_read(path, error)) from None
     except ValueError:
         raise RecordingError(f'{path} {NO_NAME}') from None
+
+
+def refuse_special(path: Path) -> None:
+    """Refuse what is there and is no regular file, before anything waits for it.
+
+    Raises:
+        RecordingError: where it is none, or a link that leads to nothing.
+    """
+    if is_there(path):
+        _require_file(path, _stat(path).st_mode)
 
 
 def _require_file(path: Path, mode: int) -> None:

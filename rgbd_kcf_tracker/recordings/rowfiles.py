@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TextIO
 
 from rgbd_kcf_tracker.errors import RecordingError
+from rgbd_kcf_tracker.recordings.files import cannot_read, open_text
 from rgbd_kcf_tracker.recordings.outputs import moved_into_place
 
 SOURCE = 'source'
@@ -117,7 +118,7 @@ def _type(column: str) -> object:
 @contextmanager
 def _opened(path: Path) -> Iterator[Iterator[list[str]]]:
     try:
-        with path.open(encoding='utf-8', newline='') as file:
+        with open_text(path) as file:
             yield csv.reader(file)
     except OSError as error:
-        raise RecordingError(f'{path} cannot be read: {error.strerror or error}') from None
+        raise RecordingError(cannot_read(path, error)) from None
