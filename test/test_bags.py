@@ -580,6 +580,28 @@ def test_a_file_that_metadata_names_is_missing(tmp_path: Path) -> None:
         read(folder)
 
 
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize(
+    'made',
+    [
+        'CREATE VIEW Messages AS WITH RECURSIVE r(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM r) '
+        'SELECT i AS id, 1 AS topic_id, i AS timestamp, zeroblob(10) AS data FROM r',
+        'CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, '
+        'data BLOB GENERATED ALWAYS AS (zeroblob(900000000)))',
+    ],
+)
+def test_a_database_that_computes_its_messages_is_refused(made: str, tmp_path: Path) -> None:
+    """A few bytes of it could be messages without end."""
+    path = WRITERS['db3'](tmp_path, camera_messages(FRAMES))
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute('ALTER TABLE messages RENAME TO old')
+        database.execute(made)
+        if 'TABLE' in made:
+            database.execute('INSERT INTO messages SELECT id, topic_id, timestamp FROM old')
+    with pytest.raises(RecordingError, match='its messages is computed, not recorded'):
+        open_recording(path)
+
+
 def test_a_database_that_was_never_checkpointed(tmp_path: Path) -> None:
     """rosbag2 was killed: the messages are in the write-ahead log beside the file."""
     path = WRITERS['db3'](tmp_path, camera_messages(FRAMES))

@@ -22,6 +22,9 @@ from rgbd_kcf_tracker.recordings.storage import HEAD, Definition, Scanned, Where
 MAGIC = b'SQLite format 3\0'
 # Byte of the head that is 2 where reading needs the write-ahead log.
 _LOGGED = 19
+_TABLES = ('topics', 'messages', 'message_definitions')
+# Of a column, as `PRAGMA table_xinfo` tells it: where, and what, says that it is computed.
+_HIDDEN, _GENERATED = 6, (2, 3)
 # A damaged file has text that is no UTF-8, and numbers that are none, too.
 _ERRORS = (sqlite3.Error, UnicodeError, ValueError, OverflowError)
 
@@ -67,10 +70,16 @@ class SqliteStorage:
         for mode in modes:
             try:
                 database = sqlite3.connect(f'file:{name}?{mode}', uri=True)
-                database.execute('SELECT count(*) FROM sqlite_master').fetchone()
-                return database
+                computed = _computed(database)
             except _ERRORS as error:
                 reason = error
+                continue
+            if computed:
+                database.close()
+                raise RecordingError(
+                    f'{self.path} is no rosbag2 database: its {computed} is computed, not recorded'
+                )
+            return database
         raise RecordingError(f'{self.path} cannot be read: {reason}')
 
     def _copied(self) -> Path:
@@ -169,3 +178,22 @@ class SqliteStorage:
         """See :meth:`Storage.close`."""
         self._database.close()
         self._drop_copy()
+
+
+def _computed(database: sqlite3.Connection) -> str:
+    """Which of a bag's tables is a view, or has a column of a formula; '' where none is.
+
+    What is computed has no end that the size of the file would set.
+    """
+    for table in _TABLES:
+        rows = database.execute(
+            'SELECT rootpage FROM sqlite_master '
+            "WHERE lower(name) = ? AND type IN ('table', 'view')",
+            (table,),
+        )
+        if any(not root for (root,) in rows):  # it has no page in the file
+            return table
+        columns = database.execute(f'PRAGMA table_xinfo({table})')
+        if any(column[_HIDDEN] in _GENERATED for column in columns):
+            return table
+    return ''
