@@ -96,7 +96,7 @@ class Dark:
             before, box = replace(self._last.frame, depth=None), self._last.box
             look = ByLook(before, box, self._parameters)
             self._gated = GatedLook(look, None, box, self._since, self._parameters.seen_ratio)
-        found = self._gated.step(frame, None, dt, turn and self._unseen < SOUGHT).look
+        found = self._gated.step(frame, None, dt, turn).look
         self._unseen = 0.0 if found is not None else self._unseen + dt
         if self._unseen >= SOUGHT:
             self.forget()

@@ -206,13 +206,12 @@ def _through_an_opening(scene: Scene, seen: Silhouette, box: Box) -> bool:
     """Whether a silhouette between two nearer things goes on above a box, and shows as densely."""
     if not (seen.cut.left and seen.cut.right):
         return False
-    rows = scene.view.shape[0]
     b = box.over(scene.view.step)
-    top = min(max(math.ceil(b.y), 0), rows)
+    top = max(math.ceil(b.y), 0)
     band = np.s_[max(top - math.ceil(ABOVE * b.height), 0) : top, seen.cols]
     z = seen.depth
     as_far = np.abs(scene.view.depth[band] - z) < depth_step(z)
-    return bool(np.count_nonzero(as_far) > LIKEWISE * seen.mask.mean() * as_far.size > 0)
+    return bool(np.count_nonzero(as_far) > LIKEWISE * seen.mask.mean() * as_far.size)
 
 
 def _piece_of(scene: Scene, box: Box) -> Silhouette | None:
@@ -338,7 +337,7 @@ def _scattered(scene: Scene, box: Box) -> Silhouette | None:
         return None
     # Who is nearer and fits the box as well is meant, rather than what shows past him.
     as_well = (_overlaps_of(scene, box) > AS_WELL * overlap)[labels]
-    nearer = as_well & scene.standing[part] & (depth < seen.depth - DEPTH_STEP)
+    nearer = as_well & (depth < seen.depth - DEPTH_STEP)
     return None if np.count_nonzero(nearer) > np.count_nonzero(mine) else seen
 
 

@@ -399,7 +399,7 @@ class MetricTargets:
         chosen = set(self._chosen)
         numbers = {person.number for person in self._crowd.people}
         self._names = {n: name for n, name in self._names.items() if n in numbers}
-        tracks = {} if self.account is None else self._in_view(frame, self.account, chosen)
+        tracks = {} if self.account is None else self._in_view(frame, self.account)
         for person in self._crowd.people:
             gone = self._time - person.seen_at
             if person.number in self._names and person.number not in chosen and gone > 0:
@@ -408,8 +408,8 @@ class MetricTargets:
                     tracks[name] = Track(None, TrackState.OCCLUDED, id=name)
         return tracks
 
-    def _in_view(self, frame: Frame, account: Account, chosen: set[int]) -> dict[int, Track]:
-        """Tracks of those in view whose numbers are not among the chosen ones."""
+    def _in_view(self, frame: Frame, account: Account) -> dict[int, Track]:
+        """Tracks of those in view whom nobody chose."""
         tracks: dict[int, Track] = {}
         # Who is followed as a target may to the account still be somebody new.
         shown = {
@@ -419,7 +419,7 @@ class MetricTargets:
             if seen is not None
         }
         for person, index in account.in_view.items():
-            if index in shown or person.number in chosen or not person.alive:
+            if index in shown or not person.alive:
                 continue
             seen = account.sights[index].seen
             box = outline_box(account.scene, seen)

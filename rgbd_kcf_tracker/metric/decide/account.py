@@ -175,9 +175,8 @@ class Account:
         if row >= len(self.odds):
             return NEW_SCORE
         odds = self.odds[:, index]
-        others = np.delete(odds, row)
-        total = 1.0 + float(np.exp(np.minimum(others, 30)).sum())
-        here = float(1 / (1 + total * np.exp(-min(odds[row], 30))))
+        total = 1.0 + float(np.exp(np.delete(odds, row)).sum())
+        here = float(1 / (1 + total * np.exp(-odds[row])))
         return here * self.sure.get(person.number, 1.0)
 
     def sight_of(self, seen: Silhouette) -> int:

@@ -233,12 +233,10 @@ class Crowd:
         """
         self.time = time
         self._frames += 1
-        if isinstance(scene.motion, Lost):
-            self._mix_ups = MixUps()
         if isinstance(scene.motion, Lost) or scene.view.shape != self._shape:
             # The pixels of before are no places in this picture, and the room begins anew, with
             # whoever has no person's shape.
-            self._shape, self._frames = scene.view.shape, 1
+            self._shape, self._frames, self._mix_ups = scene.view.shape, 1, MixUps()
             for person in self.people:
                 person.mobile, person.last, person.hidden = False, None, False
         if isinstance(scene.motion, Pose):

@@ -40,7 +40,7 @@ def stayed(scene: Scene, people: Sequence[Person], time: float) -> list[Silhouet
     shows that has just left. The places of ``people`` are as the camera stands now, at ``time`` in
     seconds.
     """
-    away = [p for p in people if p.chosen and p.misses and p.gallery.views]
+    away = [p for p in people if p.chosen and p.misses]
     if not away:
         return []
     moved = scene.stood_for <= SETTLE

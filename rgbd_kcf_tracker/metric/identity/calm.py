@@ -20,9 +20,8 @@ STIRS = 0.05
 median (docs/experiments.md)."""
 SAME_OUTLINE = 0.7
 """Share of the smaller of two outlines that lies in the other where both are of what stands."""
-NEARER, LEAST = 0.3, 30
-"""Metres by which what hid some of it then was nearer, as two people are who pass each other; and
-the pixels that nothing hid, at the least, for them to tell anything."""
+NEARER = 0.3
+"""Metres by which what hid some of it then was nearer, as two people are who pass each other."""
 CALM_FOR, CALM_SIGHTS = 2.0, 2
 """Seconds, and sights after the first, after which what has not stirred is furniture: each second
 says so by ten to one."""
@@ -58,7 +57,7 @@ class Calm:
         free = seen.mask & ((then == 0) | (then > seen.depth - NEARER))
         before, now = (each[seen.rows, seen.cols][free] for each in (self._image, image))
         off = np.abs(now.astype(np.int16) - before).max(axis=1)
-        if len(off) < LEAST or not off.any():  # a camera that repeats its picture shows nothing new
+        if not off.any():  # a camera that repeats its picture shows nothing new
             return True
         self._sights += 1
         return bool(np.count_nonzero(off > CHANGED) < STIRS * len(off))

@@ -137,10 +137,9 @@ class TextureFlow:
 
 def _forth_and_back(last: Image, now: Image, corners: Points) -> tuple[Points, Points]:
     """Corners that are found again, ``(n, 2)`` each, where they were and where they are."""
-    found, there = followed(last, now, corners)
+    found, _ = followed(last, now, corners)
     back, again = followed(now, last, found)
-    good = there & again & (np.hypot(*(back - corners).T) < BACK)
-    good &= ((found > 0) & (found < SIDE - 1)).all(axis=1)
+    good = again & (np.hypot(*(back - corners).T) < BACK)
     return corners[good], found[good]
 
 

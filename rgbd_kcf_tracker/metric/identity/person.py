@@ -131,8 +131,7 @@ class Person:
         if self.chosen:
             return True
         # What goes on beside it is something that it is a piece of, as of a wall.
-        joined = self.joined.mean if self.joined.enough else None
-        apart = joined is None or joined <= JOINED
+        apart = not self.joined.enough or (self.joined.mean or 0.0) <= JOINED
         flat = (self.flat.mean or 0.0) > FLAT
         return (self.upright or self.travelled > TRAVELLED) and apart and not flat
 

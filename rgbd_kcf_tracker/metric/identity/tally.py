@@ -28,8 +28,7 @@ each other show nearly the same."""
 def logit(probability: float) -> float:
     """Log-odds of a probability, at most :data:`SUREST` either way."""
     least = math.exp(-SUREST)
-    odds = math.log(max(probability, least) / max(1.0 - probability, least))
-    return min(max(odds, -SUREST), SUREST)
+    return math.log(max(probability, least) / max(1.0 - probability, least))
 
 
 class Tally:

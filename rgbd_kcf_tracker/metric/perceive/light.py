@@ -72,7 +72,7 @@ class Light:
 
     def _measure(self, image: Image, still: Mask) -> None:
         small = image[::STRIDE, ::STRIDE].astype(np.float32)
-        if self._first is None or self._first.shape != small.shape:
+        if self._first is None:
             self._first = small * self.gain.astype(np.float32)
         else:
             low = reduce(cv2.min, cv2.split(cv2.min(small, self._first)))

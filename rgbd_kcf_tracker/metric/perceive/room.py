@@ -131,7 +131,7 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
     """
     before, of_it = (
         np.bincount(surfaces.labels[each], minlength=len(surfaces))
-        for each in (known & nearer, known & ~nearer)
+        for each in (nearer, known & ~nearer)
     )
     left, top, width, height = cv2.boundingRect(part.view(np.uint8))
     about = slice(max(top - 1, 0), top + height + 1), slice(max(left - 1, 0), left + width + 1)
@@ -254,7 +254,7 @@ class Room:
         depth, room = depth[part], self.depth[part]
         nearer, allowed = room - depth, tolerance(depth)
         near: Mask = (nearer > np.float32(CLOSER) * allowed) & (nearer <= allowed)
-        return near & (depth > 0) & (room > 0)
+        return near
 
     def agrees(self, depth: Floats, surely: bool = True) -> bool:
         """Whether a view, ``(h, w)`` metres, mostly shows the room where it was.

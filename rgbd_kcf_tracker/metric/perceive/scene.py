@@ -263,11 +263,11 @@ class SceneReader:
         return self._level
 
     def _rim_of(self, view: DepthView, learns: bool) -> Rim:
-        """Where depth ends, by this view and those before; an empty one says nothing of it."""
+        """Where depth ends, by this view and those before."""
         if self._rim is None:
             shows = np.count_nonzero(view.depth) > SHOWS * view.depth.size
             self._rim = Rim.of(view) if shows else None
-        elif learns and view.depth.any():
+        elif learns:
             self._rim = Rim.of(view).common(self._rim)
         return self._rim or Rim()
 
