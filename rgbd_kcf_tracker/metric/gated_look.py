@@ -233,16 +233,17 @@ class GatedLook:
         expected = self._expected(account)
         if expected is None or look.depth is None or look.box.intersection(expected) == 0:
             return False
-        at = _place(account.scene.view, look.box, look.depth)
-        return self.stood is not None and at is not None and self.stood.log_odds(*at[:2]) > 0
+        return self._stood_odds(account, look) > 0
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
-        at = _place(account.scene.view, look.box, look.depth)
         followed = self._unseen == 0 and self._near_last(look.box)
-        if self.stood is None or followed or at is None:
-            return False
-        return self.stood.log_odds(*at[:2]) < ELSEWHERE
+        return not followed and self._stood_odds(account, look) < ELSEWHERE
+
+    def _stood_odds(self, account: Account, look: Look) -> float:
+        """What a place says by where the target stood, 0 where that is not known."""
+        at = _place(account.scene.view, look.box, look.depth)
+        return 0.0 if self.stood is None or at is None else self.stood.log_odds(*at[:2])
 
     def _stands(self, account: Account, look: Look) -> bool:
         """Whether a target that can move by itself would be what has always stood there."""

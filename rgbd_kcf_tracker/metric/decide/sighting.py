@@ -125,14 +125,13 @@ def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
     scene = account.scene
     if scene.motion is not None:
         return None
-    if person.upright and math.dist(account.place(seen), person.place) > LEAP:
-        return Calm(seen, scene.view, scene.image, account.time)
-    calm = person.calm
-    if calm is not None and calm.holds(seen, scene.image):
-        return calm
-    # Who was a person by his shape alone may have been one figure with what he touched, and who
-    # is one only as he was moved may be a chair.
-    sure = person.chosen or (person.upright and person.travelled > TRAVELLED)
-    if not sure and not upright(seen, scene.view.intrinsics, account.look(seen).top):
-        return Calm(seen, scene.view, scene.image, account.time)
-    return None
+    if not person.upright or math.dist(account.place(seen), person.place) <= LEAP:
+        calm = person.calm
+        if calm is not None and calm.holds(seen, scene.image):
+            return calm
+        # Who was a person by his shape alone may have been one figure with what he touched, and
+        # who is one only as he was moved may be a chair.
+        sure = person.chosen or (person.upright and person.travelled > TRAVELLED)
+        if sure or upright(seen, scene.view.intrinsics, account.look(seen).top):
+            return None
+    return Calm(seen, scene.view, scene.image, account.time)

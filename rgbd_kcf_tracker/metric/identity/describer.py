@@ -62,15 +62,11 @@ class Describer:
                 f'length: ({len(boxes)}, {self._size or "d"}) numbers, not {found.shape}'
             )
         even, steepness = self._embedding.even, self._embedding.steepness
-        told = []
-        for view, vector in zip(views, found, strict=True):
+        told = list(views)
+        for n, vector in enumerate(found):
             length = np.linalg.norm(vector)
-            says = np.isfinite(length) and length > 0
-            told.append(
-                replace(view, described=Described(vector / length, even, steepness))
-                if says
-                else view
-            )
+            if np.isfinite(length) and length > 0:  # else nothing is said
+                told[n] = replace(told[n], described=Described(vector / length, even, steepness))
         return told
 
     def everybody(
