@@ -280,15 +280,11 @@ class GatedLook:
         if drawn is not None and drawn.unlike(account.sights[index].view):
             return True
         owner = account.owner_of(index)
-        if owner is None or (drawn is None and self._held(account, look)):
+        held = drawn is None and _area(account.scene.view, look) < SMALL
+        if owner is None or held:
             return False
         beside = owner.chosen or owner.number in self._newcomers.beside
         return self._newcomers.was_there(owner) or (drawn is not None and beside)
-
-    def _held(self, account: Account, look: Look) -> bool:
-        """Whether what is found fits in the hands, and depth bears it out: somebody holds it."""
-        small = _area(account.scene.view, look) < SMALL
-        return small and (look.stands_out or self._goes_on(account, look))
 
     def _far(self, account: Account, look: Look) -> bool:
         """Whether a box elsewhere than the target was is no figure, though depth tells of it.

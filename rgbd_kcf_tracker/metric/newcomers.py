@@ -99,18 +99,11 @@ class Newcomers:
         tallest = max(MOST_TALLER * last.height, self._grown(account))
         if cut.top or cut.bottom:
             tallest = math.inf
-        for column, sight in enumerate(account.sights):
-            row = account.owner[column]
-            # Whoever was welcomed in this very frame has just been found to be another's target.
-            if row >= len(account.looks):
-                continue
-            person = account.owner_of(column)
+        for index, sight in enumerate(account.sights):
+            person = account.owner_of(index)
             if person is not None and person.chosen:  # another target
                 continue
-            met = person is not None and (self.was_there(person) or person.number in self.beside)
-            if met and account.looks[row, column] > 0:
-                continue
-            if sight.parted:  # where it ends is a guess
+            if person is not None and (self.was_there(person) or person.number in self.beside):
                 continue
             if drawn is not None and drawn.unlike(sight.view):
                 continue

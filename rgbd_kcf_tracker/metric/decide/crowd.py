@@ -290,7 +290,7 @@ class Crowd:
             places = np.stack([figure.place for figure in figures])
             views = self._describer.everybody(views, boxes, places, time)
         return [
-            Sight(each.seen, each.place, each.parted, each.low, view=view)
+            Sight(each.seen, each.place, each.parted, view=view)
             for each, view in zip(figures, views, strict=True)
         ]
 
@@ -382,7 +382,7 @@ class Crowd:
                 account.owner[column] = -1
             elif row < 0:
                 small = sight.seen.area < NEW_AREA and not _stands_apart(account, column)
-                if small or sight.low or _is_piece(account, column):
+                if small or _is_piece(account, column):
                     continue
                 newcomer = self._welcome_as(account, sight.seen, column)
                 newcomer.entered = sight.seen.ends.any
@@ -412,8 +412,6 @@ class Crowd:
                 continue
             # Who has become another in this frame is neither any more.
             if newcomer not in self.people or person not in self.people:
-                continue
-            if newcomer.resembles(person.number) < account.against + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
             self._comebacks.add(person, newcomer.first_seen, account.against)

@@ -73,13 +73,11 @@ class Figure:
         seen: the silhouette.
         place: ``(2,)`` metres across and along the floor from the camera.
         parted: whether it was cut out of a figure of several, so that its outline is a guess.
-        low: whether it is one only as it is where somebody was, who is in no other: of nobody else.
     """
 
     seen: Silhouette
     place: FloatArray
     parted: bool
-    low: bool = False
 
 
 def depth_step(z: float) -> float:
@@ -120,7 +118,7 @@ def find_figures(scene: Scene, expected: FloatArray, chosen: int = 0) -> list[Fi
                 continue
             made = makes_figure(scene, seen)
             if made or (scene.lately and seen.area > LEAST_AREA):
-                figure = Figure(seen, place_of(scene, seen), len(parts) > 1, low=not made)
+                figure = Figure(seen, place_of(scene, seen), len(parts) > 1)
                 (found if made else refused).append(figure)
     return found + _low(scene, found, refused)
 

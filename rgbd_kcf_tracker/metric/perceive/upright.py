@@ -38,12 +38,11 @@ TRUNK = (0.3, 0.8)
 from crown to chin, and shoulders begin some 0.3 m below the crown; the topmost 3 cm are hair and
 noise. Neck and shoulders overlap, for people differ and stoop."""
 HEAD_WIDTH = (0.09, 0.34)
-SHOULDER_WIDTH = (0.26, 0.8)
-TRUNK_WIDTH = (0.13, 0.8)
-"""Metres from one side to the other, at the least and at the most. A head is 0.15 m wide and 0.2 m
-deep: less where hair gives no reading, more with a hood and the blur of depth at an outline.
-Shoulders are 0.35 to 0.5 m wide, less half turned, more with arms beside them; a trunk is 0.2 m
-deep from the side."""
+SHOULDER_WIDTH, TRUNK_WIDTH = 0.26, 0.13
+"""Metres from one side to the other, of a head at the least and at the most, and of the others at
+the least. A head is 0.15 m wide and 0.2 m deep: less where hair gives no reading, more with a hood
+and the blur of depth at an outline. Shoulders are 0.35 to 0.5 m wide, less half turned; a trunk is
+0.2 m deep from the side."""
 BROADER = 1.35
 """Shoulders against head, at the least: seen from the front they are twice as broad, half turned
 less."""
@@ -57,8 +56,6 @@ FILL = 0.45
 GROWN = 1.3
 """Metres above the floor of the top of whoever is told from furniture that was there before:
 chairs, and desks with what stands on them, end below."""
-NEAR = 0.4
-"""Metres of a head and shoulders, all that a camera may show of who passes close to it."""
 HEADED = 1.45
 """Metres above the floor of a figure's upper end from which its head shows, even where the image
 or something nearer begins there."""
@@ -108,9 +105,7 @@ def _shouldered(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
     head_width, shoulder_width = float(median(head.tolist())), float(median(shoulders.tolist()))
     if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
         return False
-    if not SHOULDER_WIDTH[0] <= shoulder_width <= SHOULDER_WIDTH[1]:
-        return False
-    return shoulder_width >= BROADER * head_width
+    return shoulder_width >= max(SHOULDER_WIDTH, BROADER * head_width)
 
 
 def _necked(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
@@ -122,8 +117,7 @@ def _necked(seen: Silhouette, wide: FloatArray, per_row: float) -> bool:
     if not HEAD_WIDTH[0] <= head_width <= HEAD_WIDTH[1]:
         return False
     # A cap's brim or a nose makes no head broader than the trunk.
-    least = max(TRUNK_WIDTH[0], STOUTER * float(median(head.tolist())))
-    if not least <= trunk_width <= TRUNK_WIDTH[1]:
+    if trunk_width < max(TRUNK_WIDTH, STOUTER * float(median(head.tolist()))):
         return False
     return float(neck.min()) <= SLENDER * head_width
 
@@ -144,10 +138,10 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
     if not WIDTH[0] <= seen.width <= WIDTH[1]:
         return False
     cut = seen.cut
-    if cut.bottom and not (cut.top or cut.left or cut.right):
-        near = top is not None and HEADED < top <= TOP[1]
-        if near and seen.height > NEAR:
-            return True
+    # A head and shoulders are all that a camera may show of who passes close to it.
+    goes_on_below = cut.bottom and not (cut.top or cut.left or cut.right)
+    if goes_on_below and top is not None and HEADED < top <= TOP[1]:
+        return True
     return LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.fill >= FILL
 
 
