@@ -450,14 +450,8 @@ class ByLook:
         """
         found = self._look_at(frame, expected.cx, expected.cy)
         enough = found.ratio >= self._parameters.hidden_ratio
-        return found if enough and self.still_there(frame, self._box_at(found)) else None
-
-    def still_there(self, frame: Frame, box: Box) -> bool | None:
-        """Whether a box shows something that stands out in depth as the target did.
-
-        None where depth does not tell.
-        """
-        return self._relief.left_in(Relief.of(frame, box))
+        still = enough and self._relief.left_in(Relief.of(frame, self._box_at(found)))
+        return found if still else None
 
     def _searched(self, frame: Frame, best: Sighting | None) -> Sighting:
         """Look where it was lost, then where in the image the colours fit best.

@@ -136,7 +136,7 @@ class GatedLook:
         look, stood = self._look.step(frame, dt, turn, self._expected(account)), 0.0
         if account is not None:  # in the pixels of now, which the step above has gone over to
             self._last = self._carry(account.scene)
-        if look is not None and account is not None and self._refused(frame, account, look):
+        if look is not None and account is not None and self._refused(account, look):
             self._look.refuse(frame, look)
             look = None
         if look is not None:
@@ -204,7 +204,7 @@ class GatedLook:
         last = self._look.last_box
         return Box.from_center(across * view.step, down * view.step, last.width, last.height)
 
-    def _refused(self, frame: Frame, account: Account, look: Look) -> bool:
+    def _refused(self, account: Account, look: Look) -> bool:
         """Whether depth says that what is found is not the target."""
         # Where depth does not show it either, a look that has become unlike is something else;
         # but depth says nothing of what has no reading.
@@ -213,9 +213,6 @@ class GatedLook:
         changed &= not (
             look.stands_out or self._goes_on(account, look) or self._stands_there(account, look)
         )
-        still = self.stood is not None and self.stood.known
-        if still and self._look.still_there(frame, look.box) is False:
-            return True
         reasons = (self._stands, self._taken, self._far, self._stood_elsewhere, self._unlike)
         return changed or any(refused(account, look) for refused in reasons)
 
