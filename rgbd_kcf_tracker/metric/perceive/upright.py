@@ -56,6 +56,9 @@ FILL = 0.45
 GROWN = 1.3
 """Metres above the floor of the top of whoever is told from furniture that was there before:
 chairs, and desks with what stands on them, end below."""
+NEAR = 0.4
+"""Metres of a head and shoulders, all that a camera may show of who passes close to it: less is a
+strip of anything."""
 HEADED = 1.45
 """Metres above the floor of a figure's upper end from which its head shows, even where the image
 or something nearer begins there."""
@@ -138,9 +141,9 @@ def person_sized(seen: Silhouette, top: float | None) -> bool:
     if not WIDTH[0] <= seen.width <= WIDTH[1]:
         return False
     cut = seen.cut
-    # A head and shoulders are all that a camera may show of who passes close to it.
     goes_on_below = cut.bottom and not (cut.top or cut.left or cut.right)
-    if goes_on_below and top is not None and HEADED < top <= TOP[1]:
+    headed = top is not None and HEADED < top <= TOP[1]
+    if goes_on_below and headed and seen.height > NEAR:
         return True
     return LENGTH[cut.any] <= seen.height <= HEIGHT[1] and seen.fill >= FILL
 
