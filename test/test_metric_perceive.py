@@ -972,6 +972,17 @@ def test_two_people_who_touch_are_parted(expected: np.ndarray, half: float):
         assert outline(figure.seen).iou(one.box) > 0.85
 
 
+def test_of_three_who_touch_the_two_who_cannot_be_told_apart_are_one_beside_the_third():
+    """All three were one figure for as long as the two were expected at one place."""
+    people = [Someone(-0.225, 3.0), Someone(0.225, 3.0)]
+    expected = np.array([[-0.25, 3.0], [0.2, 3.0], [0.3, 3.05]])
+    figures = find_figures(scene_of(people), expected)
+    assert len(figures) == 2
+    found = sorted(figures, key=lambda figure: figure.place[0])
+    for figure, one in zip(found, people, strict=True):
+        assert outline(figure.seen).iou(one.box) > 0.85
+
+
 def test_who_stands_half_behind_another_is_not_joined_with_him():
     """Within an arm's reach in depth, and too close for two heads side by side."""
     people = [Someone(-0.13, 3.0), Someone(0.13, 3.28)]

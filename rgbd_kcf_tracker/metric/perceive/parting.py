@@ -108,20 +108,17 @@ def parted(
     points = np.stack((across, ahead[v, u_]), axis=1) / reach
     seeds = seeds / reach
     some = points[::EVERY]
-    for _ in range(3):
-        owner = _nearest(some, seeds)
-        count = np.bincount(owner, minlength=len(seeds))
-        keep = count > LEAST_SHARE * len(some) / len(seeds)
-        if not keep.all():
-            seeds = seeds[keep]
-            if len(seeds) < 2:
-                return [mask]
-            continue
-        sums = [np.bincount(owner, some[:, axis]) for axis in (0, 1)]
-        seeds = np.stack(sums, axis=1) / count[:, None]
-    apart = np.hypot(*((seeds[:, None] - seeds[None]) * reach).transpose(2, 0, 1))
-    if (apart[np.triu_indices(len(seeds), 1)] < least).any():
-        return [mask]
+    while True:
+        seeds, count = _settled(some, seeds)
+        if len(seeds) < 2:
+            return [mask]
+        apart = np.hypot(*((seeds[:, None] - seeds[None]) * reach).transpose(2, 0, 1))
+        apart[np.tril_indices(len(seeds))] = np.inf
+        nearest = np.unravel_index(int(apart.argmin()), apart.shape)
+        if apart[nearest] >= least:
+            break
+        # Two who cannot be told apart are one, and the others are still somebody else.
+        seeds = np.delete(seeds, min(nearest, key=lambda n: count[n]), axis=0)
     owner = _nearest(points, seeds)
     parts = []
     for index in range(len(seeds)):
@@ -166,6 +163,26 @@ def _farther(mask: Mask, ahead: Floats, metres: float) -> Mask | None:
         if not len(rows) or (rows[-1] + 1 - rows[0]) * metres < TALL:
             return None
     return behind
+
+
+def _settled(points: FloatArray, seeds: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+    """The middles of what is nearest to each of the seeds, and how many points that are.
+
+    Seeds with next to nothing are left out.
+    """
+    count = np.zeros(len(seeds), np.intp)
+    for _ in range(3):
+        owner = _nearest(points, seeds)
+        count = np.bincount(owner, minlength=len(seeds))
+        keep = count > LEAST_SHARE * len(points) / len(seeds)
+        if not keep.all():
+            seeds, count = seeds[keep], count[keep]
+            if len(seeds) < 2:
+                break
+            continue
+        sums = [np.bincount(owner, points[:, axis]) for axis in (0, 1)]
+        seeds = np.stack(sums, axis=1) / count[:, None]
+    return seeds, count
 
 
 def _nearest(points: FloatArray, seeds: FloatArray) -> npt.NDArray[np.intp]:
