@@ -52,7 +52,8 @@ figure's area: more than half, so that it is never the same as two."""
 SAME_AGAIN = 0.5
 """Log-odds beyond those against coming back, and ahead of anybody else, at which somebody is one
 who was here before, by one sight or by several: a number given to a stranger is worse than one more
-number. With those against it they are seven to one."""
+number. With those that are against it at first they are seven to one, and less is never enough for a
+number, however many come back."""
 REUNION, PAUSE = 1.0, 3.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place; and
 the same where hardly a frame was taken meanwhile, as by a slow camera. Within a second a walker
@@ -317,18 +318,18 @@ class Account:
             return None
         return other
 
-    def likest(self, newcomer: Person, enough: float = 0.0) -> Person | None:
+    def likest(self, newcomer: Person, surely: bool = False) -> Person | None:
         """Who of those that went away before a newcomer came he seems to be, if one of them.
 
         Args:
             newcomer: the newcomer.
-            enough: sightings from which that is said, counted by how much showed: a first one alone
-                seldom tells, what several say together does.
+            surely: whether by enough to give him that one's number: a first sighting alone seldom
+                tells, what several say together does.
         """
         # Who once came back unrecognised is known twice: it is the first that he is.
         alike = [
             (
-                newcomer.resembles(person.number, enough)
+                newcomer.resembles(person.number, surely)
                 + math.log(is_new(person.again, self.against)),
                 index,
             )

@@ -22,7 +22,7 @@ from rgbd_kcf_tracker.metric.decide.account import (
     Sight,
     look_of,
 )
-from rgbd_kcf_tracker.metric.decide.arrivals import Arrival, Arrivals, is_new
+from rgbd_kcf_tracker.metric.decide.arrivals import RETURN, Arrival, Arrivals, is_new
 from rgbd_kcf_tracker.metric.decide.association import NEW, assigned, log_odds
 from rgbd_kcf_tracker.metric.decide.comebacks import Comebacks
 from rgbd_kcf_tracker.metric.decide.mix_ups import Followed, MixUps
@@ -35,7 +35,6 @@ from rgbd_kcf_tracker.metric.identity.describer import Describer
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stature import LEVEL, Tilt
-from rgbd_kcf_tracker.metric.identity.tally import ENOUGH
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import UPRIGHT, Figure, find_figures
 from rgbd_kcf_tracker.metric.perceive.parting import APART
@@ -407,11 +406,13 @@ class Crowd:
         for newcomer in list(account.people):
             if newcomer.chosen or newcomer.again < account.against + SAME_AGAIN:
                 continue
-            person = account.likest(newcomer, ENOUGH)
+            person = account.likest(newcomer, surely=True)
             if person is None or person.chosen:  # he is recognised by who follows him
                 continue
             # Who has become another in this frame is neither any more.
             if newcomer not in self.people or person not in self.people:
+                continue
+            if newcomer.resembles(person.number) < max(account.against, RETURN) + SAME_AGAIN:
                 continue
             self._arrivals.returned(newcomer.first_seen - person.seen_at)
             self._comebacks.add(person, newcomer.first_seen, account.against)

@@ -13,7 +13,7 @@ import numpy as np
 from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import Gallery, View
-from rgbd_kcf_tracker.metric.identity.tally import ENOUGH, Heard, Tally
+from rgbd_kcf_tracker.metric.identity.tally import Heard, Tally
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
 from rgbd_kcf_tracker.pose import Pose
 
@@ -227,9 +227,15 @@ class Person:
         """Mean log-odds of looking like another, in the sightings of late; None for none."""
         return self._resembles[other].mean if other in self._resembles else None
 
-    def resembles(self, other: int, enough: float = ENOUGH) -> float:
-        """Log-odds of looking like another, by all sightings of late; 0 where there are too few."""
-        return self._resembles[other].odds(enough) if other in self._resembles else 0.0
+    def resembles(self, other: int, surely: bool = True) -> float:
+        """Log-odds of looking like another, by all sightings of late; 0 where there are none.
+
+        ``surely``: so that the one is given the number of the other, see :attr:`Heard.recognised`.
+        """
+        heard = self._resembles.get(other)
+        if heard is None:
+            return 0.0
+        return heard.recognised if surely else heard.odds(enough=0.0)
 
     def forget(self, other: int) -> None:
         """Drop what is remembered of another, who is no more."""

@@ -14,6 +14,10 @@ double tells from certainty."""
 ENOUGH = 1.5
 """Sightings, counted by how much showed, from which they are believed: more than any one of them,
 which may be of a mixed outline."""
+IN_ALL = 2.0
+"""The same of all sightings of who may have been here before, however long ago, from which he is
+recognised: two that show all of him. Of late alone it would depend on how often the camera looks:
+of somebody slim, seen from the side, five frames a second would never be enough."""
 LATELY = 1.5
 """Seconds after which a sighting says a third of what it said: at first often little of somebody
 shows, or somebody else beside him, and a number may have gone over from one to another."""
@@ -93,6 +97,7 @@ class Heard(Tally):
     def __init__(self) -> None:
         super().__init__()
         self._heights, self._told = Tally(), False
+        self._in_all = 0.0
 
     def hear(self, odds: float, weight: float, time: float, *, height: float, told: bool) -> None:
         """Take a sighting.
@@ -104,11 +109,22 @@ class Heard(Tally):
             height: what of them is by the height.
             told: whether that tells how tall he is.
         """
+        self._in_all += weight
         self.add(odds - height, weight, time)
         if told and not self._told:
             self._heights, self._told = Tally(), True
         if told or not self._told:
             self._heights.add(height, weight, time)
+
+    @property
+    def enough(self) -> bool:
+        """Whether so much was seen in all that it is believed."""
+        return self._in_all >= IN_ALL
+
+    @property
+    def recognised(self) -> float:
+        """Log-odds by all of them as far as they are believed; 0 before enough was seen."""
+        return self.believed if self.enough else 0.0
 
     @property
     def mean(self) -> float | None:
