@@ -925,6 +925,18 @@ def resemble(one: Person, number: int, odds: float, weight: float, time: float =
     one.resembled(Person(number, np.zeros(2), 0.0), odds, view, time)
 
 
+@pytest.mark.parametrize('rate', [1, 2, 5, 10, 30])
+def test_who_is_slim_is_recognised_however_often_the_camera_looks(rate: int):
+    """Of late alone, what is seen of him from the side would never be enough at 5 Hz and below."""
+    one, sightings = Person(1, np.zeros(2), 0.0), 20
+    for n in range(sightings):
+        resemble(one, 7, 4.0, 0.12, n / rate)
+        resemble(one, 8, 4.0, 0.01, n / rate)
+    assert one.resembles(7) > 0
+    assert one.resembles(8) == 0.0, 'of which so little shows may be anybody'
+    assert one.resembles(8, surely=False) == pytest.approx(4.0)
+
+
 def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     one = Person(1, np.zeros(2), 0.0)
     assert one.resemblance(7) is None
@@ -938,7 +950,7 @@ def test_resemblance_is_the_mean_over_the_sightings_of_late_by_what_they_show():
     assert one.resembles(8) == 0.0
     resemble(one, 9, 2.0, 0.5, 0.0)
     assert one.resembles(9) == 0.0, 'half a sighting is too little to go by for good'
-    assert one.resembles(9, enough=0.0) == pytest.approx(2.0)
+    assert one.resembles(9, surely=False) == pytest.approx(2.0)
     # What was seen long ago, when little of him showed, says no more who he is.
     for time in (20.0, 20.5, 21.0):
         resemble(one, 7, -2.0, 1.0, time)
@@ -1474,6 +1486,22 @@ def test_nobody_becomes_one_who_has_just_become_another():
     assert who(account, 0) in watched.crowd.people
 
 
+@pytest.mark.parametrize(('odds', 'same'), [(1.2, False), (2.5, True)])
+def test_even_where_all_come_back_nobody_is_given_a_number_by_less_than_seven_to_one(odds, same):
+    """Of one who stood half hidden for 20 s it was given to another, by looks of four to one."""
+    watched = Watched()
+    one = watched.crowd.welcome(np.full(2, 1.0), 0.1)
+    account = watched.see(Someone(0.0, 3.0, RED))
+    newcomer = who(account, 0)
+    newcomer.first_seen, newcomer.again, account.against = one.seen_at + 1.0, odds, 0.0
+    for _ in range(3):
+        resemble(newcomer, one.number, odds, 1.0, watched.time)
+    account.people = [one, newcomer]
+    account.owner = [1]
+    watched.crowd._reunite(account)
+    assert (who(account, 0) is one) == same
+
+
 def test_two_who_change_places_keep_who_they_are():
     watched = Watched()
     left = right = None
@@ -1750,6 +1778,69 @@ def test_who_came_out_beside_another_and_has_his_number_is_who_was_hidden(
     first = next(each for each in said if each is not None)
     # Who was chosen is recognised by who follows him: there stands somebody new.
     assert first == (here[0].person, None if chosen else other, other.seen_at)
+
+
+@pytest.mark.parametrize(
+    ('new', 'own', 'beside', 'found'),
+    [
+        (RED, GREEN, 0.4, True),
+        (GREEN, RED, 0.4, False),  # he is still the one
+        (RED, RED, 0.4, False),  # twins
+        (GREEN, GREEN, 0.4, False),  # turned round, beside something that looks like that side
+        (RED, GREEN, 2.0, False),  # nobody's figure held them both
+    ],
+)
+def test_of_one_figure_that_turns_out_to_be_two_he_is_who_looks_as_he_did_before(
+    new, own, beside, found
+):
+    """Both were learned as he while they were one, and his number went with either."""
+    views = look(own, GREY), look(new, GREY)
+    one = Person(0, np.array([0.0, 4.8]), 0.0, chosen=True)
+    one.gallery.learn(look(RED, GREY), 0.0)
+    one.gallery.learn(look(GREEN, GREY), 9.8)
+    newcomer = Person(1, np.array([beside, 4.8]), 10.0)
+    watch, said = MixUps(), []
+    for time in (10.0 + 0.1 * i for i in range(7)):
+        here = [
+            Followed(who, who.place, views[n], n, likeness(who, views))
+            for n, who in enumerate((one, newcomer))
+            if who.first_seen < time
+        ]
+        said.append(watch.watch(here, [], time))
+        one.seen_at = newcomer.seen_at = time
+    assert not any(said[:3]), 'one sighting is too little'
+    if found:
+        mixed_up = next(each for each in said if each is not None)
+        assert mixed_up[:2] == (one, newcomer)
+        assert 8.5 < mixed_up.since < 9.8
+    else:
+        assert not any(said)
+
+
+@pytest.mark.parametrize(
+    ('left', 'lies', 'another'), [(0.05, False, True), (0.3, False, False), (0.05, True, False)]
+)
+def test_who_comes_in_just_where_another_goes_out_is_somebody_else_if_he_looks_otherwise(
+    left: float, lies: bool, another: bool
+):
+    """No frame showed nobody: of the one a leg was left in the image when the other came in.
+
+    In who lies nothing is where it was in who stood, so that his looks say nothing.
+    """
+    stands = look(GREEN, GREEN)
+    views = (dataclasses.replace(stands, top=0.4) if lies else stands,)
+    one = met(0, (0.0, 3.0), views, look(RED, RED))
+    one.person.gallery.stature.learn(Height(1.7, 3.0, 0.0, False))
+    view = DepthView(np.full((60, 80), 3.0, np.float32), 1, CAMERA)
+    leg = Silhouette.trimmed(view, 0, 40, np.ones((20, 10), bool), Rim())
+    watch, said = MixUps(), []
+    watch.watch([], [], 9.9)
+    one.person.seen_at, area = 9.9, left
+    for time in (10.0 + 0.1 * i for i in range(8)):
+        one.person.last = dataclasses.replace(leg, area=area)
+        said.append(watch.watch([one], [], time))
+        one.person.seen_at, area = time, 0.5
+    assert any(said) == another
 
 
 @pytest.mark.parametrize('lost', [True, False])

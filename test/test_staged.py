@@ -109,6 +109,15 @@ def person_who_fills_the_view(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), way), stays]
 
 
+def two_who_pass_in_a_corridor(stage: Stage, z: float) -> list[Actor]:
+    """One comes out from behind him, far off, and for a moment they are one figure."""
+    stage.depth, stage.half_width = 9.5, 1.3
+    left, right = stage.uniform(0.0, 0.15), stage.uniform(0.2, 0.3)
+    away = [(0, 0.1, 3.4), (3.5, -left, 5.9), (6, -left, 5.9)]
+    comes = [(0, right, 7.3), (6, right, 0.9)]
+    return [stage.walk(stage.person(), way) for way in (away, comes)]
+
+
 def two_who_hug(stage: Stage, z: float) -> list[Actor]:
     """They come from both sides, and their middles are 0.26 m apart for three seconds."""
     return [
@@ -467,3 +476,9 @@ def test_a_click_on_the_head_of_one_seen_from_his_side_is_about_all_of_him(seed:
     body = first.truth.body
     box = target_at(first.frame, body.cx, body.y + 0.06 * body.height)
     assert box.iou(first.truth.visible) > 0.6
+
+
+def test_who_passes_another_far_off_is_not_taken_for_him_once_they_are_two_again() -> None:
+    """The other came out from behind him, beside him they were one figure, and he was the other."""
+    (has,) = followed(staged(two_who_pass_in_a_corridor, 11, 5.5))
+    assert np.mean(has) > 0.9

@@ -4,12 +4,14 @@
 """Numbers that may have gone over to somebody else, and how that shows.
 
 Where somebody comes into view just where another was lost, or comes out beside another who is
-hidden now himself, places say little of who is who. Afterwards they say much, and each is followed
-as whoever he was taken for. Only the looks tell, over some sightings and by what was known before.
+hidden now himself, or where one figure turns out to be two people, places say little of who is who.
+Afterwards they say much, and each is followed as whoever he was taken for. Only the looks tell,
+over some sightings and by what was known before.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -32,6 +34,12 @@ somebody was is one who is hidden: another side or another light may show of him
 HIDDEN_FOR = 10.0
 """Seconds for which who was lost may come out under another's number: people stand together for as
 long."""
+ALL_BUT_OUT = 0.1
+"""Square metres of somebody at the end of what is seen below which whatever shows there next may be
+another: less than anybody new shows (:data:`~.crowd.NEW_AREA`)."""
+ONE_FIGURE = 1.0
+"""Seconds for which two who meet are one figure, of which one is followed and which is learned as
+he: as long as two who pass each other, a shoulder's breadth apart, overlap at a walk."""
 SIGHTINGS = 2.5
 """Sightings, counted by how much showed, that must say so: each is where he was expected."""
 SIGHTING = 0.1
@@ -82,6 +90,20 @@ class _Return(NamedTuple):
     another: Tally
 
 
+class _Parted(NamedTuple):
+    """One figure that turned out to be two people.
+
+    Attributes:
+        since: seconds, from when on what was learned may be of both.
+        at: seconds of the first frame that showed two.
+        exchanged: log-odds, by looks, that the newcomer is he whom the other is taken for.
+    """
+
+    since: float
+    at: float
+    exchanged: Tally
+
+
 class MixUps:
     """Watches all who came near each other or were lost for a moment."""
 
@@ -89,6 +111,7 @@ class MixUps:
         self._near: dict[int, float] = {}
         self._returns: dict[int, _Return] = {}
         self._hidden: dict[tuple[int, int], Tally] = {}
+        self._parted: dict[tuple[int, int], _Parted] = {}
         self._time, self._counts = 0.0, 1.0
 
     def watch(
@@ -109,7 +132,11 @@ class MixUps:
         self._near = {n: last for n, last in self._near.items() if time - last < AFTER}
         self._returns = {n: back for n, back in self._returns.items() if time - back.at < AFTER}
         self._counts = min(1.0, (time - self._time) / SIGHTING)
-        found = self._returned(here, time) or self._came_out(here, gone, time)
+        found = (
+            self._returned(here, time)
+            or self._came_out(here, gone, time)
+            or self._parts(here, time)
+        )
         self._time = time
         return found
 
@@ -119,14 +146,12 @@ class MixUps:
             number = one.person.number
             if one.person.chosen:  # he is recognised by who follows him
                 continue
-            if one.person.seen_at < self._time:
+            if one.person.seen_at < self._time or _all_but_out(one.person):
                 self._returns[number] = _Return(self._time, time, Tally())
             back = self._returns.get(number)
             if back is None:
                 continue
-            odds = one.person.gallery.log_odds_before(
-                back.since, one.view, one.alike[:, one.column]
-            )
+            odds = _by_before(one.person, one, one.alike, back.since)
             if odds is None:
                 continue
             back.another.add(-odds, self._counts * one.view.shows, time)
@@ -147,9 +172,7 @@ class MixUps:
                 since = other.seen_at
                 if other.out_of_reach(one.place, time):
                     continue
-                taken = one.person.gallery.log_odds_before(
-                    since, one.view, one.alike[:, one.column]
-                )
+                taken = _by_before(one.person, one, one.alike, since)
                 if taken is None:
                     continue
                 odds = other.gallery.log_odds(
@@ -163,6 +186,52 @@ class MixUps:
                     del tallies[key]
         self._hidden = tallies
         return found
+
+    def _parts(self, here: Sequence[Followed], time: float) -> MixUp | None:
+        """Who came out of somebody's figure, and is he whom that other has been taken for since."""
+        self._parted = {k: each for k, each in self._parted.items() if time - each.at < AFTER}
+        in_view = {one.person.number: one for one in here}
+        for new in here:
+            if new.person.first_seen != self._time or new.person.chosen:
+                continue
+            for one in here:
+                person = one.person
+                beside = math.dist(person.place, new.person.place) < NEAR
+                if beside and person.seen_at == self._time and person.first_seen < self._time:
+                    since = self._time - ONE_FIGURE
+                    key = person.number, new.person.number
+                    self._parted[key] = _Parted(since, self._time, Tally())
+        for key, (since, _, exchanged) in list(self._parted.items()):
+            if not in_view.keys() >= set(key):
+                continue
+            one, new = (in_view[number] for number in key)
+            if new.person.chosen:
+                continue
+            odds, taken = (_by_before(one.person, each, one.alike, since) for each in (new, one))
+            if odds is None or taken is None:
+                continue
+            shows = min(one.view.shows + new.view.shows, 1.0)
+            exchanged.add(min(odds, odds - taken), self._counts * shows, time)
+            if exchanged.odds(SIGHTINGS) > ANOTHER:
+                del self._parted[key]
+                return MixUp(one.person, new.person, since)
+        return None
+
+
+def _by_before(person: Person, one: Followed, alike: Floats, since: float) -> float | None:
+    """Log-odds that somebody in view is a person, by what was known of that one before ``since``.
+
+    None where nothing was, or where he cannot be compared: in who lies nothing is where it was.
+    ``alike`` is the likeness of all in view to that person's views.
+    """
+    if not person.gallery.stands(one.view.top, one.view.leans):
+        return None
+    return person.gallery.log_odds_before(since, one.view, alike[:, one.column])
+
+
+def _all_but_out(person: Person) -> bool:
+    """Whether hardly anything of somebody showed at the end of what is seen."""
+    return person.last is not None and person.last.ends.any and person.last.area < ALL_BUT_OUT
 
 
 def _near(here: Sequence[Followed]) -> list[int]:
