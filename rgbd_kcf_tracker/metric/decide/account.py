@@ -52,7 +52,7 @@ figure's area: more than half, so that it is never the same as two."""
 SAME_AGAIN = 0.5
 """Log-odds beyond those against coming back, and ahead of anybody else, at which somebody is one
 who was here before, by one sight or by several: a number given to a stranger is worse than one more
-number. With those that are against it at first they are seven to one, and less is never enough for a
+number. With those that are against it at first they are seven to one; less is never enough for a
 number, however many come back."""
 REUNION, PAUSE = 1.0, 3.0
 """Seconds of absence after which somebody who was chosen is recognised by more than his place; and
