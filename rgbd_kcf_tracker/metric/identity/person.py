@@ -101,8 +101,8 @@ class Person:
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
-        joined: the shares of its outline where it is joined to something large, as seen by a camera
-            that has moved lately.
+        joined: the shares of its outline where it is joined to something large; of what has a
+            person's shape only as seen by a camera that has moved lately.
         flat: 1 for each sighting as something flat, 0 for others, see
             :func:`~rgbd_kcf_tracker.metric.perceive.upright.flat`; none of who was chosen.
         again: log-odds that it is one of those who had gone before it came, by its looks alone, see
