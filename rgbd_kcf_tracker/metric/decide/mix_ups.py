@@ -77,12 +77,13 @@ class MixUp(NamedTuple):
     since: float
 
 
-class _Return(NamedTuple):
-    """One who came back, and the log-odds of his looks that he is another.
+class _Watched(NamedTuple):
+    """One who came back, or one figure that turned out to be two people.
 
     Attributes:
-        since: seconds of the frame before, from when on what was learned may be of another.
-        at: seconds of his return.
+        since: seconds, from when on what was learned may be of another.
+        at: seconds of the first frame that showed him again, or two.
+        another: log-odds, by looks, that he is another, or that the newcomer is he.
     """
 
     since: float
@@ -90,28 +91,14 @@ class _Return(NamedTuple):
     another: Tally
 
 
-class _Parted(NamedTuple):
-    """One figure that turned out to be two people.
-
-    Attributes:
-        since: seconds, from when on what was learned may be of both.
-        at: seconds of the first frame that showed two.
-        exchanged: log-odds, by looks, that the newcomer is he whom the other is taken for.
-    """
-
-    since: float
-    at: float
-    exchanged: Tally
-
-
 class MixUps:
     """Watches all who came near each other or were lost for a moment."""
 
     def __init__(self) -> None:
         self._near: dict[int, float] = {}
-        self._returns: dict[int, _Return] = {}
+        self._returns: dict[int, _Watched] = {}
         self._hidden: dict[tuple[int, int], Tally] = {}
-        self._parted: dict[tuple[int, int], _Parted] = {}
+        self._parted: dict[tuple[int, int], _Watched] = {}
         self._time, self._counts = 0.0, 1.0
 
     def watch(
@@ -147,11 +134,11 @@ class MixUps:
             if one.person.chosen:  # he is recognised by who follows him
                 continue
             if one.person.seen_at < self._time or _all_but_out(one.person):
-                self._returns[number] = _Return(self._time, time, Tally())
+                self._returns[number] = _Watched(self._time, time, Tally())
             back = self._returns.get(number)
             if back is None:
                 continue
-            odds = _by_before(one.person, one, one.alike, back.since)
+            odds = _by_before(one, one, back.since)
             if odds is None:
                 continue
             back.another.add(-odds, self._counts * one.view.shows, time)
@@ -172,7 +159,7 @@ class MixUps:
                 since = other.seen_at
                 if other.out_of_reach(one.place, time):
                     continue
-                taken = _by_before(one.person, one, one.alike, since)
+                taken = _by_before(one, one, since)
                 if taken is None:
                     continue
                 odds = other.gallery.log_odds(
@@ -200,33 +187,33 @@ class MixUps:
                 if beside and person.seen_at == self._time and person.first_seen < self._time:
                     since = self._time - ONE_FIGURE
                     key = person.number, new.person.number
-                    self._parted[key] = _Parted(since, self._time, Tally())
-        for key, (since, _, exchanged) in list(self._parted.items()):
+                    self._parted[key] = _Watched(since, self._time, Tally())
+        for key, (since, _, another) in list(self._parted.items()):
             if not in_view.keys() >= set(key):
                 continue
             one, new = (in_view[number] for number in key)
             if new.person.chosen:
                 continue
-            odds, taken = (_by_before(one.person, each, one.alike, since) for each in (new, one))
+            odds, taken = (_by_before(one, each, since) for each in (new, one))
             if odds is None or taken is None:
                 continue
             shows = min(one.view.shows + new.view.shows, 1.0)
-            exchanged.add(min(odds, odds - taken), self._counts * shows, time)
-            if exchanged.odds(SIGHTINGS) > ANOTHER:
+            another.add(min(odds, odds - taken), self._counts * shows, time)
+            if another.odds(SIGHTINGS) > ANOTHER:
                 del self._parted[key]
                 return MixUp(one.person, new.person, since)
         return None
 
 
-def _by_before(person: Person, one: Followed, alike: Floats, since: float) -> float | None:
-    """Log-odds that somebody in view is a person, by what was known of that one before ``since``.
+def _by_before(one: Followed, seen: Followed, since: float) -> float | None:
+    """Log-odds that somebody in view is one of them, by what was known of him before ``since``.
 
     None where nothing was, or where he cannot be compared: in who lies nothing is where it was.
-    ``alike`` is the likeness of all in view to that person's views.
     """
-    if not person.gallery.stands(one.view.top, one.view.leans):
+    gallery = one.person.gallery
+    if not gallery.stands(seen.view.top, seen.view.leans):
         return None
-    return person.gallery.log_odds_before(since, one.view, alike[:, one.column])
+    return gallery.log_odds_before(since, seen.view, one.alike[:, seen.column])
 
 
 def _all_but_out(person: Person) -> bool:

@@ -235,7 +235,7 @@ class Person:
         heard = self._resembles.get(other)
         if heard is None:
             return 0.0
-        return heard.recognised if surely else heard.odds(enough=0.0)
+        return heard.recognised if surely else heard.odds()
 
     def forget(self, other: int) -> None:
         """Drop what is remembered of another, who is no more."""

@@ -73,9 +73,9 @@ class Tally:
     @property
     def believed(self) -> float:
         """Log-odds by all of them, less where less than a glimpse was seen."""
-        return self.odds(enough=0.0) * min(1.0, self._count / GLIMPSE)
+        return self.odds() * min(1.0, self._count / GLIMPSE)
 
-    def odds(self, enough: float = ENOUGH) -> float:
+    def odds(self, enough: float = 0.0) -> float:
         """Log-odds by all of them; 0 where they count less than ``enough``.
 
         Sightings of one walk say little more than one of them: that two people wear the same does
