@@ -21,8 +21,8 @@ from rgbd_kcf_tracker.metric.perceive.light import Light
 from rgbd_kcf_tracker.metric.perceive.room import REACH, SETTLE, GoingOn, Room
 from rgbd_kcf_tracker.metric.perceive.scene import Scene, SceneReader
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Silhouette
-from rgbd_kcf_tracker.metric.perceive.surfaces import surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import child, flat, rounded, upright, upright_people
+from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, surfaces_in
+from rgbd_kcf_tracker.metric.perceive.upright import Shapes, child, flat, rounded, upright
 from rgbd_kcf_tracker.pose import Pose
 
 NOBODY = np.zeros((ROWS, COLS), bool)
@@ -824,7 +824,11 @@ def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool):
     assert flat(view, None, seen) is not round_
     half = np.ones((80, 40), np.bool_)
     half[::2, 1:-1] = False
-    assert not flat(view, None, Silhouette.of(view, 60, 20, half, 0, Rim())), 'as a body fills it'
+    assert flat(view, None, Silhouette.of(view, 60, 20, half, 0, Rim())) is not round_
+    comes_in = Silhouette.of(view, 60, 20, half, 0, Rim(left=60))
+    assert flat(view, None, comes_in) is False, 'as a body fills its box'
+    few = np.ones((30, 40), np.bool_)
+    assert flat(view, None, Silhouette.of(view, 60, 20, few, 0, Rim())) is None
 
 
 @pytest.mark.parametrize(
@@ -1056,11 +1060,46 @@ def test_the_tall_are_told_apart_from_those_whose_shape_alone_says_so():
     assert scene is not None
     for above, tall in ((2.0, True), (1.25, False)):
         elevation = np.full((ROWS, COLS), above, np.float32)
-        found = upright_people(
-            scene.view, scene.surfaces, elevation, scene.forward, scene.axes[0], Rim()
+        shapes = Shapes(
+            scene.view,
+            scene.surfaces,
+            scene.sizes,
+            elevation,
+            scene.forward,
+            scene.axes[0],
+            Rim(),
         )
+        found = shapes.upright()
         assert found.mask.any()
         assert found.tall.any() == tall
+
+
+STANDS = Someone(0.0, 3.0).box
+
+
+@pytest.mark.parametrize(
+    ('moved', 'covered', 'somebody'),
+    [
+        (np.s_[90:130, :110], False, True),  # an arm
+        (np.s_[:, :], False, False),  # he has come
+        (np.s_[:100, :], False, False),  # with what stands below, as behind a chair
+        (np.s_[90:130, :110], True, False),  # more of it may be hidden, as of a wall
+    ],
+)
+def test_what_has_a_persons_shape_is_somebody_once_something_of_it_moves(
+    moved: tuple[slice, slice], covered: bool, somebody: bool
+):
+    _, depth = images([Someone(0.0, 3.0)])
+    mask = depth < WALL
+    if covered:
+        depth[int(STANDS.y) : int(STANDS.bottom), int(STANDS.right) :] = 1.0
+    view, surfaces = DepthView(depth, 1, CAMERA), surfaces_in(depth, depth > 0, 0.04, 0.03)
+    sizes, axes = Sizes.of(surfaces, CAMERA), np.eye(3)
+    shapes = Shapes(view, surfaces, sizes, None, depth, axes[0], Rim())
+    before = np.zeros_like(mask)
+    before[moved] = mask[moved]
+    of_it = np.bincount(surfaces.labels[before], minlength=len(surfaces)) > 0
+    assert np.array_equal(shapes.stirring(of_it, before), mask & somebody)
 
 
 def test_what_is_too_small_for_anybody_is_no_figure():

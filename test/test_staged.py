@@ -159,6 +159,11 @@ def one_seen_from_his_side(stage: Stage, z: float) -> list[Actor]:
     return [he, stage.walk(stage.person(), passes)]
 
 
+def one_who_turns(stage: Stage, z: float) -> list[Actor]:
+    """He stands there from the first frame on, seen from his side, and turns to the camera."""
+    return [stage.walk(stage.person(), [(0, stage.x(0.1, z), z)], [(0, 1.5), (1.5, 1.5), (2, 0)])]
+
+
 def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
     """He comes where the target has left, 13 cm taller or shorter at least; then he does."""
     side, out = stage.sign(), 3.0
@@ -348,8 +353,8 @@ def test_a_child_that_comes_back_is_known_again(seed: int):
     assert np.mean(has) > 0.8
 
 
-@pytest.mark.parametrize('seed', [1, 2])
-def test_a_wall_that_is_read_now_and_then_is_nobody(seed: int):
+@pytest.mark.parametrize(('seed', 'side'), [(1, 3), (2, 3), (1, 8)])
+def test_a_wall_that_is_read_now_and_then_is_nobody(seed: int, side: int):
     """Steel and glass give a reading here and there: each was somebody who had come."""
     targets, rng, boxes = TargetSet('metric'), np.random.default_rng(seed), 0
     targets.everyone = True
@@ -358,7 +363,8 @@ def test_a_wall_that_is_read_now_and_then_is_nobody(seed: int):
         assert frame.depth is not None
         assert shown is not None
         depth, patch = frame.depth.copy(), np.s_[60:170, 176:256]
-        blocks = np.kron(rng.uniform(size=(37, 27)), np.ones((3, 3)))[:110, :80]
+        size = 110 // side + 1, 80 // side + 1
+        blocks = np.kron(rng.uniform(size=size), np.ones((side, side)))[:110, :80]
         depth[patch][(depth[patch] > 3.3) & (blocks > 0.25)] = np.nan
         for track in targets.update(dataclasses.replace(frame, depth=depth)).values():
             boxes += track.box is not None and track.box.intersection(shown) < 0.3 * track.box.area
@@ -481,4 +487,16 @@ def test_a_click_on_the_head_of_one_seen_from_his_side_is_about_all_of_him(seed:
 def test_who_passes_another_far_off_is_not_taken_for_him_once_they_are_two_again() -> None:
     """The other came out from behind him, beside him they were one figure, and he was the other."""
     (has,) = followed(staged(two_who_pass_in_a_corridor, 11, 5.5))
+    assert np.mean(has) > 0.9
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3, 4, 5, 6])
+def test_who_turns_where_he_stood_from_the_first_frame_on_is_somebody(seed: int) -> None:
+    """From his side nothing told him from furniture, and then he was the room until he walked."""
+    targets, has = TargetSet('metric'), list[bool]()
+    targets.everyone = True
+    for sample in staged(one_who_turns, seed, 4.0):
+        boxes = [track.box for track in targets.update(sample.frame).values()]
+        if sample.frame.stamp_ns - EPOCH_NS > 2.2e9:
+            has.append(any(box is not None and box.iou(sample.visible) > 0.6 for box in boxes))
     assert np.mean(has) > 0.9

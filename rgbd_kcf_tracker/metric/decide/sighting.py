@@ -68,7 +68,9 @@ def learn_sighting(
         if joined is not None:
             person.joined.add(joined, weight, account.time)
     if index >= 0 and not person.chosen:
-        person.flat.add(flat(scene.view, scene.elevation, seen), weight, account.time)
+        is_flat = flat(scene.view, scene.elevation, seen)
+        if is_flat is not None:
+            person.flat.add(is_flat, weight, account.time)
     if not sure or (scene.since is None and person.gallery.views):
         return
     person.area = max(person.area, seen.area)

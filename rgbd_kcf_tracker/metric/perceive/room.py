@@ -55,11 +55,13 @@ MOST = 0.5
 """Share of where a part of a surface that was hidden meets what is known, along which it goes on as
 the room, from which that part is room, too; and of somebody's pixels, from which they are his."""
 GOES_ON = 0.25
-"""Share of a surface that must be known to stand before the room, and no less of it than is room,
-for the rest of it to be somebody too."""
+"""Share of a surface that must be known to stand before the room for the rest of it to be somebody
+too, if no more of it is room or it has a person's shape."""
 GOES_ON_AREA = 0.06
 """Square metres of it that are enough whatever its size, about a head and a shoulder: who walks
 into the view of a camera that turns shows more beyond its last end than within."""
+ALL = 0.9
+"""Share of it before the room from which nothing of it is the room: some rim is always left."""
 REACH = 0.5
 """Metres from the middle of somebody as far as which a surface that is larger than anybody may
 still be he: half of someone with arms half spread. Who touches a desk is not the desk."""
@@ -153,6 +155,17 @@ def _continues_room(part: Mask, known: Mask, nearer: Mask, surfaces: Surfaces) -
     result: Mask = (goes_on > MOST * meets) & (before <= of_it)
     result[0] = False
     return result
+
+
+def _enough(before: npt.NDArray[np.intp], surfaces: Surfaces, k: Intrinsics) -> Mask:
+    """Surfaces, ``(n,)`` bool, of which enough stands before the room for all to be somebody.
+
+    ``before`` is ``(n,)``, how many of their pixels do, and ``k`` of the view.
+    """
+    share = before / np.maximum(surfaces.pixels, 1)
+    enough: Mask = (share > GOES_ON) | (share * surfaces.areas(k) > GOES_ON_AREA)
+    enough[0] = False
+    return enough
 
 
 def _about(somebody: Mask, depth: Floats) -> Floats:
@@ -341,10 +354,7 @@ class Room:
         theirs = surfaces.labels[nearer]
         before = np.bincount(theirs, minlength=count)
         room = np.bincount(surfaces.labels[valid & known & ~nearer], minlength=count)
-        share = before / np.maximum(surfaces.pixels, 1)
-        enough = (share > GOES_ON) | (share * surfaces.areas(k) > GOES_ON_AREA)
-        whose = (before > room) & enough
-        whose[0] = False
+        whose = (before > room) & _enough(before, surfaces, k)
         somebody: Mask = whose[surfaces.labels]
         rows, columns = np.nonzero(somebody)
         label = surfaces.labels[rows, columns]
@@ -353,6 +363,14 @@ class Room:
         beyond = np.zeros_like(somebody)
         beyond[rows[far], columns[far]] = True
         return GoingOn(somebody & ~beyond, beyond)
+
+    def moved_part_of(self, surfaces: Surfaces, k: Intrinsics) -> Mask:
+        """Surfaces of the last view, ``(n,)`` bool, of which some stands before it, but not all.
+
+        ``k`` is of the view.
+        """
+        before = np.bincount(surfaces.labels[self.before], minlength=len(surfaces))
+        return _enough(before, surfaces, k) & (before < ALL * surfaces.pixels)
 
     def update(
         self,

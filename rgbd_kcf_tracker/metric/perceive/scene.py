@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.metric.perceive.paint import Paint
 from rgbd_kcf_tracker.metric.perceive.room import Room
 from rgbd_kcf_tracker.metric.perceive.silhouette import Rim, Sides, Silhouette
 from rgbd_kcf_tracker.metric.perceive.surfaces import Sizes, Surfaces, standing, surfaces_in
-from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, UprightPeople, upright_people
+from rgbd_kcf_tracker.metric.perceive.upright import HEIGHT, WIDTH, Shapes
 from rgbd_kcf_tracker.pose import Pose
 
 STILL, STILL_TURN = 0.003, 0.001
@@ -59,6 +59,7 @@ class Scene:
         vacant: ``(h, w)`` bool, where the frames before have shown what is there when nobody is.
         known_for: ``(h, w)`` float32, see :attr:`Room.known_for`.
         surfaces: what stands on it.
+        sizes: places and sizes of these.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
         codes: of its colours.
@@ -84,6 +85,7 @@ class Scene:
     vacant: Mask
     known_for: Floats
     surfaces: Surfaces
+    sizes: Sizes
     rim: Rim
     image: Image
     codes: ColorCodes
@@ -93,11 +95,6 @@ class Scene:
     since: float | None
     lately: Sequence[Silhouette]
     _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
-
-    @cached_property
-    def sizes(self) -> Sizes:
-        """Places and sizes of the surfaces."""
-        return Sizes.of(self.surfaces, self.view.intrinsics)
 
     @cached_property
     def large(self) -> Mask:
@@ -199,18 +196,17 @@ class SceneReader:
             axes = level.axes(view.intrinsics)
         mask = standing(view, elevation, self._floor_margin)
         surfaces = surfaces_in(view.depth, mask, self._jump, self._jump_per_metre)
+        sizes = Sizes.of(surfaces, view.intrinsics)
         rim = self._rim_of(view, learns)
         self.stood_for = self.stood_for + seconds if motion is None else 0.0
-
-        def upright(whole: bool) -> UprightPeople:
-            return upright_people(view, surfaces, elevation, forward, axes[0], rim, whole=whole)
+        shapes = Shapes(view, surfaces, sizes, elevation, forward, axes[0], rim)
 
         stands = way is None and view.shape == self.room.depth.shape
         lately = self.lately if stands and seconds <= STEP else ()
         if not stands:
             self._paint.restart()
         closer = self._closer(image, view, lately)
-        self._see_room(view, surfaces, rim, upright, motion, seconds, learns, closer)
+        self._see_room(shapes, motion, seconds, learns, closer)
         before = self.room.before
         image = self._light.steadied(image, ~before, learns)
         if unlearned is not None:
@@ -228,6 +224,7 @@ class SceneReader:
             vacant=self.room.vacant,
             known_for=self.room.known_for,
             surfaces=surfaces,
+            sizes=sizes,
             rim=rim,
             image=image,
             codes=ColorCodes(image),
@@ -290,38 +287,40 @@ class SceneReader:
 
     def _see_room(
         self,
-        view: DepthView,
-        surfaces: Surfaces,
-        rim: Rim,
-        upright: Callable[[bool], UprightPeople],
+        shapes: Shapes,
         motion: Pose | Lost | None,
         seconds: float,
         learns: bool,
         closer: Mask | None,
     ) -> None:
-        """Show the room a view; ``upright`` tells who in it is a person by his shape alone."""
+        """Show the room a view; ``shapes`` tells who in it is a person by his shape alone."""
+        view, surfaces = shapes.view, shapes.surfaces
         begins = self.room.depth.shape != view.shape or isinstance(motion, Lost)
         if begins or not self._begun:
             # A camera that warms up sends images without readings: people come with the first.
             self._begun = bool(view.depth.any())
-            self.room.restart(view.depth, upright(False).mask)
+            self.room.restart(view.depth, shapes.upright().mask)
             self._light.restart()
             return
         somebody, undecided = self.somebody, None
         if isinstance(motion, Pose):
             unknown = self.room.moved(motion, view.intrinsics)
-            people = upright(True)
-            large = larger_than_anybody(Sizes.of(surfaces, view.intrinsics))
+            people = shapes.upright(whole=True)
+            large = larger_than_anybody(shapes.sizes)
             going_on = self.room.going_on(view.depth, surfaces, large, view.intrinsics, seconds)
             opened = (people.mask | going_on.somebody) & unknown
             opened |= self.room.passing(people.tall, view.depth, surfaces)
             self.room.open(opened, view.depth)
             # Whose other side comes into view next may be somebody or something, and so may
             # be what somebody touches.
-            undecided = _at_side(view, surfaces, rim, large) | going_on.beyond
+            undecided = _at_side(view, surfaces, shapes.rim, large) | going_on.beyond
             self._light.restart()
             somebody = None
         self.room.update(view.depth, seconds, somebody, surfaces, learns, undecided, closer)
+        if motion is None and learns:
+            moved = self.room.moved_part_of(surfaces, view.intrinsics)
+            if moved.any():
+                self.room.open(shapes.stirring(moved, self.room.before), view.depth)
 
     def settle(self) -> None:
         """Do what an answer need not wait for."""

@@ -71,6 +71,8 @@ FITS, PIXELS, OUTLIER = 3, 600, 4.0
 SPARSE, SOLID = 0.3, 0.7
 """Shares of the box that a flat thing fills, at the most and at the least: a wall of which readings
 come and go a quarter, a door's leaf nine tenths, in the median, and real people 0.55."""
+STIRS = 0.5
+"""Share of a head before which something stands from which it has not been there from the first."""
 CHILD, FEET = 0.8, 0.25
 """Metres that show of a child of four, who is 1.05 m tall, at the least, and above the floor where
 that begins at the most: feet are as near to the floor as its height is uncertain."""
@@ -177,13 +179,16 @@ def child(seen: Silhouette, top: float | None) -> bool:
     return top - seen.height < FEET and seen.fill > SPARSE
 
 
-def flat(view: DepthView, elevation: Floats | None, seen: Silhouette) -> bool:
+def flat(view: DepthView, elevation: Floats | None, seen: Silhouette) -> bool | None:
     """Whether a silhouette is a door's leaf, or some readings of a wall, and has no person's shape.
 
-    It is tall and flat, and fills its box as nobody does. ``elevation`` is ``(h, w)`` metres above
-    the floor, None where none is known.
+    None where too little shows to tell. Who comes in at a side may be as flat, but fills his box
+    as they do not. ``elevation`` is ``(h, w)`` metres above the floor, None where none is known.
     """
-    if seen.height < LENGTH[1] or SPARSE < seen.fill < SOLID or rounded(view, seen):
+    if seen.height < LENGTH[1]:
+        return None
+    comes_in = seen.ends.any and SPARSE < seen.fill < SOLID
+    if comes_in or rounded(view, seen):
         return False
     return not upright(seen, view.intrinsics, seen.highest(elevation))
 
@@ -202,58 +207,97 @@ class UprightPeople:
     tall: Mask
 
 
-def upright_people(
-    view: DepthView,
-    surfaces: Surfaces,
-    elevation: Floats | None,
-    forward: Floats,
-    right: FloatArray,
-    rim: Rim,
-    whole: bool = False,
-) -> UprightPeople:
-    """All surfaces and parts of them that have a person's shape.
+@dataclass(frozen=True, slots=True, eq=False)
+class Shapes:
+    """What stands on the floor of a view, of which some may have a person's shape.
 
-    Args:
+    Attributes:
         view: the depth.
         surfaces: what stands on the floor.
+        sizes: of these.
         elevation: ``(h, w)`` metres above the floor, None where none is known.
         forward: ``(h, w)`` metres along the floor.
         right: ``(3,)`` unit vector along it to the right, in the camera's frame.
         rim: of the view.
-        whole: whether only those count of which both sides show: of a wall or a cupboard any strip
-            may be seen.
     """
-    k = view.intrinsics
-    sizes = Sizes.of(surfaces, k)
-    tall, wide = sizes.height, sizes.width
-    possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
-    possible[0] = False
-    one = wide <= WIDTH[1]
-    # Two chairs beside each other have two heads as well.
-    several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
-    people, tall_ones = list[Silhouette](), list[Silhouette]()
-    for label in np.flatnonzero(possible & (one | several)).tolist():
-        left, upper, mask = surfaces.crop(label)
-        found = []
-        if one[label]:
-            single = Silhouette.of(view, left, upper, mask, label, rim)
-            found = [single] if upright(single, k, single.highest(elevation)) else []
-        if not found and several[label]:
-            parts = parted(view, forward, right, left, upper, mask)
-            parts = parts if len(parts) > 1 else []
-            cut = [Silhouette.trimmed(view, left, upper, part, rim) for part in parts]
-            found = [
-                part
-                for part in cut
-                if part is not None
-                if part.height >= LENGTH[0] and upright(part, k, part.highest(elevation))
-            ]
-        for seen in found:
-            if whole and (seen.ends.left or seen.ends.right):
+
+    view: DepthView
+    surfaces: Surfaces
+    sizes: Sizes
+    elevation: Floats | None
+    forward: Floats
+    right: FloatArray
+    rim: Rim
+
+    def upright(self, whole: bool = False) -> UprightPeople:
+        """All surfaces and parts of them that have a person's shape.
+
+        Args:
+            whole: whether only those count of which both sides show: of a wall or a cupboard any
+                strip may be seen.
+        """
+        view, k = self.view, self.view.intrinsics
+        tall, wide = self.sizes.height, self.sizes.width
+        possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
+        possible[0] = False
+        one = wide <= WIDTH[1]
+        # Two chairs beside each other have two heads as well.
+        several = (tall >= LENGTH[0]) & (wide > BROAD) & (wide <= GROUP)
+        people, tall_ones = list[Silhouette](), list[Silhouette]()
+        for label in np.flatnonzero(possible & (one | several)).tolist():
+            found = []
+            if one[label]:
+                single = self._silhouette(label)
+                found = [single] if upright(single, k, single.highest(self.elevation)) else []
+            if not found and several[label]:
+                crop = self.surfaces.crop(label)
+                parts = parted(view, self.forward, self.right, *crop)
+                parts = parts if len(parts) > 1 else []
+                cut = [Silhouette.trimmed(view, *crop[:2], part, self.rim) for part in parts]
+                found = [
+                    part
+                    for part in cut
+                    if part is not None
+                    if part.height >= LENGTH[0] and upright(part, k, part.highest(self.elevation))
+                ]
+            for seen in found:
+                if whole and (seen.ends.left or seen.ends.right):
+                    continue
+                people.append(seen)
+                if one[label] and seen.height >= LENGTH[0]:
+                    top = seen.highest(self.elevation)
+                    if top is None or top > GROWN:
+                        tall_ones.append(seen)
+        return UprightPeople(together(people, view.shape), together(tall_ones, view.shape))
+
+    def stirring(self, moved: Mask, before: Mask) -> Mask:
+        """Who stood still from the first view on, as the room does, until he turned.
+
+        His head is where it was: what has a person's shape only together with somebody who has come
+        is a thing beside that one.
+
+        Args:
+            moved: ``(n,)`` bool, the surfaces of which some has.
+            before: ``(h, w)`` bool, pixels that show something before the room.
+
+        Returns:
+            His pixels, ``(h, w)`` bool.
+        """
+        tall, wide, people = self.sizes.height, self.sizes.width, list[Silhouette]()
+        possible = moved & (tall >= HEIGHT[0]) & (tall <= HEIGHT[1])
+        for label in np.flatnonzero(possible & (wide >= WIDTH[0]) & (wide <= WIDTH[1])).tolist():
+            seen = self._silhouette(label)
+            # Of what goes on at a side any strip may be seen.
+            if seen.ends.left or seen.ends.right or seen.cut.left or seen.cut.right:
                 continue
-            people.append(seen)
-            if one[label] and seen.height >= LENGTH[0]:
-                top = seen.highest(elevation)
-                if top is None or top > GROWN:
-                    tall_ones.append(seen)
-    return UprightPeople(together(people, view.shape), together(tall_ones, view.shape))
+            head = seen.mask[: max(int(HEAD[1] * self.view.intrinsics.fy / seen.depth), 1)]
+            if before[seen.rows, seen.cols][: len(head)][head].mean() > STIRS:
+                continue
+            top = seen.highest(self.elevation)
+            if (top is None or top > GROWN) and upright(seen, self.view.intrinsics, top):
+                people.append(seen)
+        return together(people, self.view.shape)
+
+    def _silhouette(self, label: int) -> Silhouette:
+        left, upper, mask = self.surfaces.crop(label)
+        return Silhouette.of(self.view, left, upper, mask, label, self.rim)
