@@ -164,6 +164,10 @@ def one_who_turns(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), [(0, stage.x(0.1, z), z)], [(0, 1.5), (1.5, 1.5), (2, 0)])]
 
 
+def one_who_stands_quite_still(stage: Stage, z: float) -> list[Actor]:
+    return [stage.walk(stage.person(), [(0, stage.x(0.1, z), z)], [(0, 1.5)])]
+
+
 def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
     """He comes where the target has left, 13 cm taller or shorter at least; then he does."""
     side, out = stage.sign(), 3.0
@@ -499,4 +503,16 @@ def test_who_turns_where_he_stood_from_the_first_frame_on_is_somebody(seed: int)
         boxes = [track.box for track in targets.update(sample.frame).values()]
         if sample.frame.stamp_ns - EPOCH_NS > 2.2e9:
             has.append(any(box is not None and box.iou(sample.visible) > 0.6 for box in boxes))
+    assert np.mean(has) > 0.9
+
+
+@pytest.mark.parametrize('seed', [2, 15])
+def test_who_has_a_persons_shape_in_most_frames_is_no_furniture(seed: int) -> None:
+    """One frame in which he had none, seen from his side, and after two seconds he was the room."""
+    targets, has = TargetSet('metric'), list[bool]()
+    targets.everyone = True
+    for sample in staged(one_who_stands_quite_still, seed, 5.0):
+        boxes = [track.box for track in targets.update(sample.frame).values()]
+        has.append(any(box is not None and box.iou(sample.visible) > 0.6 for box in boxes))
+    assert has[0]
     assert np.mean(has) > 0.9

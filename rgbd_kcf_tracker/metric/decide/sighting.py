@@ -130,12 +130,14 @@ def _calm(account: Account, person: Person, seen: Silhouette) -> Calm | None:
     if scene.motion is not None:
         return None
     if not person.upright or math.dist(account.place(seen), person.place) <= LEAP:
-        calm = person.calm
-        if calm is not None and calm.holds(seen, scene.image):
-            return calm
         # Who was a person by his shape alone may have been one figure with what he touched, and
         # who is one only as he was moved may be a chair.
         sure = person.chosen or (person.upright and person.travelled > TRAVELLED)
-        if sure or upright(seen, scene.view.intrinsics, account.look(seen).top):
+        if not sure and upright(seen, scene.view.intrinsics, account.look(seen).top):
+            return None
+        calm = person.calm
+        if calm is not None and calm.holds(seen, scene.image):
+            return calm
+        if sure:
             return None
     return Calm(seen, scene.view, scene.image, account.time)
