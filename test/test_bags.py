@@ -53,6 +53,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rgbd_kcf_tracker.errors import ImageError, RecordingError, RgbdKcfError
 from rgbd_kcf_tracker.frame import Frame
 from rgbd_kcf_tracker.geometry import Box
+from rgbd_kcf_tracker.live.prefetch import prefetched
 from rgbd_kcf_tracker.live.replay_settings import ReplayParameters
 from rgbd_kcf_tracker.live.replay_source import ReplaySource
 from rgbd_kcf_tracker.recordings import (
@@ -125,6 +126,15 @@ def test_every_format_gives_the_same_frames(kind: str, tmp_path: Path) -> None:
     assert_same_frames(frames, FRAMES)
     assert [w for w in warnings if 'no metadata.yaml' not in w] == []
     assert bool(warnings) == ('no metadata' in kind)
+
+
+@pytest.mark.parametrize('kind', WRITERS)
+def test_every_format_is_read_on_in_another_thread(kind: str, tmp_path: Path) -> None:
+    """As replay and the page do: no SQLite bag could be replayed, or shown."""
+    bag = RawBag(WRITERS[kind](tmp_path, camera_messages(FRAMES)))
+    with prefetched(bag.read(topic, index) for topic, index in bag.in_order()) as ahead:
+        assert len(list(ahead)) == 3 * len(FRAMES)
+    bag.close()
 
 
 @pytest.mark.parametrize('kind', WRITERS)

@@ -69,7 +69,8 @@ class SqliteStorage:
         name = quote(os.fsencode(place))
         for mode in modes:
             try:
-                database = sqlite3.connect(f'file:{name}?{mode}', uri=True)
+                # Who replays or shows a bag opens it in one thread, and reads on in another.
+                database = sqlite3.connect(f'file:{name}?{mode}', uri=True, check_same_thread=False)
                 computed = _computed(database)
             except _ERRORS as error:
                 reason = error
