@@ -25,7 +25,7 @@ from rgbd_kcf_tracker.evaluation.datasets.base import (
     without_depth,
 )
 from rgbd_kcf_tracker.evaluation.datasets.images import unrotate
-from rgbd_kcf_tracker.evaluation.datasets.simulated import parse_seeds
+from rgbd_kcf_tracker.evaluation.datasets.simulated import find, parse_seeds
 from rgbd_kcf_tracker.evaluation.datasets.vot import parse_region
 from rgbd_kcf_tracker.evaluation.runner import identify
 from rgbd_kcf_tracker.frame import Frame
@@ -492,8 +492,22 @@ def test_seeds():
     assert parse_seeds('3') == [3]
     assert parse_seeds('1-3,7,2') == [1, 2, 3, 7]
     for bad in ('', 'x', '5-1', '1-'):
-        with pytest.raises(DatasetError, match='seeds'):
+        with pytest.raises(DatasetError, match=r"^--seeds '.*': give numbers like 3, 1-5"):
             parse_seeds(bad)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize('text', ['1-100000000000', '1-9999,5-10004', f'0-{10**30}'])
+def test_seeds_without_end_are_refused_by_the_name_of_the_option(text: str) -> None:
+    """So many were said to be no numbers, and a hundred thousand were made scenes of."""
+    for find_them, name in (
+        (lambda: parse_seeds(text), '--seeds'),
+        (lambda: find(f'sim:all:{text}', ()), f'sim:all:{text}: seeds'),
+    ):
+        with pytest.raises(DatasetError) as raised:
+            find_them()
+        assert str(raised.value) == f'{name} {text!r}: give no more than 10000 seeds'
+    assert len(parse_seeds('1-10000')) == 10_000
 
 
 def sample(stamp_ms: int, box: Box | None = None) -> Sample:

@@ -584,7 +584,7 @@ def _check(args: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
     try:
         args.seeds = [seed for word in args.seeds for seed in parse_seeds(word)]
     except DatasetError as error:
-        parser.error(f'--seeds: {error}')
+        parser.error(str(error))
     if len(set(args.seeds)) < len(args.seeds):
         parser.error('--seeds must name each of them once')
 

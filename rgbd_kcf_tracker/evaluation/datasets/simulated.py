@@ -21,6 +21,8 @@ from rgbd_kcf_tracker.recordings.mot import BARELY_VISIBLE
 from rgbd_kcf_tracker.simulation import SCENARIOS, check_request, expand_names, simulate
 
 PREFIX = 'sim:'
+MOST_SEEDS = 10_000
+"""At once, of all scenes hundreds of thousands."""
 
 
 def find(
@@ -58,7 +60,9 @@ def find(
     if scenarios:
         chosen = [name for name in chosen if name in scenarios]
     found = [
-        (name, seed) for name in chosen for seed in (parse_seeds(seed_text) if seed_text else seeds)
+        (name, seed)
+        for name in chosen
+        for seed in (parse_seeds(seed_text, f'{text}: seeds') if seed_text else seeds)
     ]
     for name, seed in found:  # every mistake before anything is run
         check_request(name, seed, rate_hz, duration_s, size)
@@ -76,23 +80,28 @@ def find(
     ]
 
 
-def parse_seeds(text: str) -> list[int]:
+def parse_seeds(text: str, option: str = '--seeds') -> list[int]:
     """Seeds of ``3``, ``1-5`` or ``1,4,7-9``.
 
+    Args:
+        text: that was given.
+        option: by which it was given, for the error.
+
     Raises:
-        DatasetError: where the text is none of these.
+        DatasetError: where the text is none of these, or names more than :data:`MOST_SEEDS`.
     """
-    seeds: list[int] = []
+    ranges: list[range] = []
     try:
         for part in text.split(','):
             first, dash, last = part.partition('-')
-            low, high = int(first), int(last) if dash else int(first)
-            if high < low or high - low > 100_000:
-                raise ValueError
-            seeds.extend(range(low, high + 1))
+            ranges.append(range(int(first), int(last if dash else first) + 1))
+        if not all(ranges):
+            raise ValueError
     except ValueError:
-        raise DatasetError(f'seeds {text!r}: give numbers like 3, 1-5 or 1,4,7-9') from None
-    return list(dict.fromkeys(seeds))
+        raise DatasetError(f'{option} {text!r}: give numbers like 3, 1-5 or 1,4,7-9') from None
+    if sum(seeds.stop - seeds.start for seeds in ranges) > MOST_SEEDS:
+        raise DatasetError(f'{option} {text!r}: give no more than {MOST_SEEDS} seeds')
+    return list(dict.fromkeys(seed for seeds in ranges for seed in seeds))
 
 
 def load(
