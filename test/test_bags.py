@@ -803,6 +803,57 @@ def test_a_damaged_record_in_a_chunk_is_told(kind: str, tmp_path: Path) -> None:
     assert re.search(r'the chunk at byte \d+ is damaged, and read up to there$', warning)
 
 
+@pytest.mark.parametrize(
+    'damage',
+    [
+        "UPDATE messages SET timestamp = 'noon' WHERE id = 2",
+        "UPDATE messages SET timestamp = x'00ff' WHERE id = 2",
+        'UPDATE messages SET timestamp = 1e300 WHERE id = 2',
+        "UPDATE messages SET data = 'text' WHERE id = 2",
+        'UPDATE messages SET data = 5 WHERE id = 2',
+        'UPDATE messages SET topic_id = 99 WHERE id = 2',
+        "UPDATE messages SET topic_id = 'text' WHERE id = 2",
+        f"UPDATE topics SET name = x'00ff' WHERE name = '{INFO}'",
+    ],
+)
+def test_rows_of_a_wrong_type_are_told(damage: str, tmp_path: Path) -> None:
+    """SQLite takes any value in any column: such messages were left out without a word."""
+    path = WRITERS['db3'](tmp_path, camera_messages(FRAMES))
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute(damage)
+    bag = RawBag(path)
+    bag.close()
+    lost = 3 * len(FRAMES) - sum(map(len, bag.topics.values()))
+    assert lost == (6 if 'topics' in damage else 1)
+    assert bag.warnings == [
+        f'{path}: {lost} messages are left out: they are damaged, or of no topic that it holds'
+    ]
+
+
+@pytest.mark.parametrize(
+    ('kind', 'field', 'wrong'),
+    [('ROS 1', b'time=', b'tame='), ('ROS 1', b'conn=', b'conn=\x63'), ('mcap', b'', b'\x63')],
+)
+def test_messages_of_no_topic_and_of_no_time_are_told(
+    kind: str, field: bytes, wrong: bytes, tmp_path: Path
+) -> None:
+    path = WRITERS[kind](tmp_path, camera_messages(FRAMES))
+    bag = RawBag(path)
+    _, _, at, _ = bag.topics[COLOR].places[8:12]
+    bag.close()
+    data = bytearray(path.read_bytes())
+    # In MCAP the number of the channel is the first of what stands before a message.
+    place = data.rindex(field, 0, at) if field else at - 22
+    data[place : place + len(wrong)] = wrong
+    path.write_bytes(data)
+    bag = RawBag(path)
+    bag.close()
+    assert sum(map(len, bag.topics.values())) == 3 * len(FRAMES) - 1
+    assert bag.warnings == [
+        f'{path}: 1 messages are left out: they are damaged, or of no topic that it holds'
+    ]
+
+
 @pytest.mark.parametrize('kind', ['mcap', 'ROS 1'])
 def test_packed_zeros_are_no_records(kind: str, tmp_path: Path) -> None:
     """A file of 1 kB claimed millions of empty records, and was looked through for minutes."""

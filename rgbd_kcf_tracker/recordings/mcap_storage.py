@@ -75,9 +75,11 @@ class McapStorage:
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
         self.qos: dict[str, str] = {}
+        self.unusable = 0
         self.warnings: list[str] = []
         self._schemas: dict[int, str] = {}
-        self._channels: dict[int, tuple[str, str]] = {}
+        # None of one that is left out.
+        self._channels: dict[int, tuple[str, str] | None] = {}
         # Place of a packed chunk: method, place of its data, their length, unpacked length, CRC.
         self._chunks: dict[int, tuple[str, int, int, int, int]] = {}
         self._unpacked = lru_cache(CACHED_CHUNKS)(self._unpack)
@@ -171,17 +173,16 @@ class McapStorage:
         self, source: _File | _Memory | Unpacker, body: int, length: int, chunk: int | None
     ) -> Scanned | None:
         start = _MESSAGE_HEAD.size
-        if length < start:
-            return None
         head = source.read(body, min(start + HEAD, length))
-        if len(head) < start:
+        channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(head.ljust(start))
+        if len(head) < start or channel not in self._channels:
+            self.unusable += 1
             return None
-        channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(head)
-        if channel not in self._channels:
+        known = self._channels[channel]
+        if known is None:
             return None
-        topic, kind = self._channels[channel]
         where = (-1 if chunk is None else chunk, body + start, length - start)
-        return Scanned(topic, kind, log_ns, head[start:], where)
+        return Scanned(*known, log_ns, head[start:], where)
 
     def _chunk(self, body: int, length: int) -> Iterator[Scanned]:
         available = min(length, self._file.size - body)
@@ -259,6 +260,7 @@ class McapStorage:
                 f'{self.path}: topic {channel.topic} is in {channel.message_encoding!r}, '
                 'not in cdr, and is left out'
             )
+            self._channels[channel.id] = None
             return
         kind = self._schemas.get(channel.schema_id, '')
         self._channels[channel.id] = (channel.topic, kind)

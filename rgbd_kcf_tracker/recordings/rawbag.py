@@ -157,6 +157,11 @@ class RawBag:
             self.left_out |= storage.left_out
             self.qos |= storage.qos
             self.warnings += storage.warnings
+            if storage.unusable:
+                self.warnings.append(
+                    f'{storage.path}: {storage.unusable} messages are left out: '
+                    'they are damaged, or of no topic that it holds'
+                )
         for name, count in others.items():
             self.warnings.append(
                 f'{self.path}: {count} messages of {name} are left out: '

@@ -51,6 +51,7 @@ class Ros1Storage:
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
         self.qos: dict[str, str] = {}
+        self.unusable = 0
         self.warnings: list[str] = []
         self._connections: dict[int, tuple[str, str]] = {}
         # Place of a packed chunk's data: method, their length, unpacked length.
@@ -163,10 +164,11 @@ class Ros1Storage:
             data = self._at(body, length) if memory is None else memory[body : body + length]
             self._connect(fields, data)
             return None
-        if operation != _MESSAGE or len(fields.get(b'time', b'')) != 8:
+        if operation != _MESSAGE:
             return None
         connection = self._connections.get(int.from_bytes(fields.get(b'conn', b''), 'little'))
-        if connection is None:
+        if connection is None or len(fields.get(b'time', b'')) != 8:
+            self.unusable += 1
             return None
         seconds, nanoseconds = struct.unpack('<II', fields[b'time'])
         size = min(HEAD, length)

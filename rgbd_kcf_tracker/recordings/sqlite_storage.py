@@ -44,6 +44,7 @@ class SqliteStorage:
         self.definitions: dict[str, Definition] = {}
         self.left_out: dict[str, str] = {}
         self.qos: dict[str, str] = {}
+        self.unusable = 0
         self.warnings: list[str] = []
         self._copy: tempfile.TemporaryDirectory[str] | None = None
         with open_file(path) as file:
@@ -108,13 +109,14 @@ class SqliteStorage:
         """See :meth:`Storage.scan`."""
         try:
             rows = self._database.execute('SELECT id, name, type, serialization_format FROM topics')
-            names: dict[int, tuple[str, str]] = {}
+            names: dict[int, tuple[str, str] | None] = {}
             for number, name, kind, form in rows:
                 if not (isinstance(name, str) and isinstance(kind, str)):
                     continue
                 if form != 'cdr':
                     self.left_out[name] = str(form)
                     self.warnings.append(f'{self.path}: topic {name} is in {form!r}: left out')
+                    names[number] = None
                     continue
                 names[number] = (name, kind)
                 self.topics[name] = kind
@@ -124,8 +126,12 @@ class SqliteStorage:
         self._read_qos()
         try:
             for number, topic, log_ns, length, data in self._rows():
+                # SQLite takes a value of any type in any column.
                 if topic in names and isinstance(data, bytes) and isinstance(log_ns, int):
-                    yield Scanned(*names[topic], log_ns, data, (-1, number, length))
+                    if known := names[topic]:
+                        yield Scanned(*known, log_ns, data, (-1, number, length))
+                else:
+                    self.unusable += 1
         except _ERRORS as error:
             self.warnings.append(
                 f'{self.path} is damaged or was cut off ({error}): '

@@ -66,7 +66,9 @@ class Storage(Protocol):
         left_out: name to serialisation of topics that are not read; filled by :meth:`scan`.
         qos: name to the profiles of its publishers, as rosbag2 writes them (YAML), as far as the
             file holds them; filled by :meth:`scan`.
-        warnings: what was odd; filled by :meth:`scan`.
+        unusable: how many messages are damaged, or of no topic that it holds; filled by
+            :meth:`scan`.
+        warnings: what else was odd; filled by :meth:`scan`.
     """
 
     path: Path
@@ -75,6 +77,7 @@ class Storage(Protocol):
     definitions: dict[str, Definition]
     left_out: dict[str, str]
     qos: dict[str, str]
+    unusable: int
     warnings: list[str]
 
     def scan(self) -> Iterator[Scanned]:
