@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import signal
+import sqlite3
 import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +67,19 @@ def test_every_fault_befalls_something(fault: Fault, tmp_path: Path) -> None:
     before = repr(state())
     fault(trial)
     assert repr(state()) != before
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_an_odd_cell_is_in_the_database(seed: int, tmp_path: Path) -> None:
+    made, _ = materials(tmp_path)
+    (path,) = made['sqlite'].glob('*.db3')
+    before = path.read_bytes()
+    SOURCE_FAULTS['an odd cell'](
+        Trial(np.random.default_rng(seed), made['sqlite'], tmp_path, '1,2,3,4')
+    )
+    assert path.read_bytes() != before
+    with closing(sqlite3.connect(path)) as database:
+        assert database.execute('PRAGMA integrity_check').fetchall() == [('ok',)]
 
 
 def test_it_sees_what_must_not_be(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 import socket
+import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -203,6 +204,34 @@ def _odd_number(trial: Trial) -> None:
     return None
 
 
+COLUMNS = {
+    'messages': ('topic_id', 'timestamp', 'data'),
+    'topics': ('id', 'name', 'type', 'serialization_format'),
+}
+CELLS = (
+    'NULL', "'text'", "''", '1.5', '1e300', "x'00ff'", '0', '-5', '9223372036854775807',
+    '-9223372036854775808',
+)  # fmt: skip
+
+
+def _odd_cell(trial: Trial) -> None:
+    """A value of another type, or far from any, in rows of a database; else a byte flipped."""
+    databases = [p for p in trial.files() if p.suffix == '.db3']
+    if not databases:
+        return _flipped(trial)
+    table = sorted(COLUMNS)[int(trial.rng.integers(len(COLUMNS)))]
+    column = COLUMNS[table][int(trial.rng.integers(len(COLUMNS[table])))]
+    cell = CELLS[int(trial.rng.integers(len(CELLS)))]
+    with closing(sqlite3.connect(databases[0])) as database, database:
+        # A copy takes anything: the columns of rosbag2's own must not be NULL.
+        database.execute(f'ALTER TABLE {table} RENAME TO old')
+        database.execute(f'CREATE TABLE {table} AS SELECT * FROM old')
+        database.execute('DROP TABLE old')
+        every = int(trial.rng.integers(1, 8))
+        database.execute(f'UPDATE {table} SET {column} = {cell} WHERE rowid % {every} = 0')
+    return None
+
+
 def _pipe(trial: Trial) -> None:
     path = trial.any_file()
     path.unlink()
@@ -231,6 +260,12 @@ def _loop(trial: Trial) -> None:
     path = trial.any_file()
     path.unlink()
     path.symlink_to(path)
+
+
+def _link_to_nothing(trial: Trial) -> None:
+    path = trial.any_file()
+    path.unlink()
+    path.symlink_to(path.with_name('nothing'))
 
 
 def _folder_for_file(trial: Trial) -> None:
@@ -276,10 +311,12 @@ SOURCE_FAULTS: dict[str, Fault] = {
     'removed': _removed,
     'exchanged': _exchanged,
     'an odd number': _odd_number,
+    'an odd cell': _odd_cell,
     'a pipe': _pipe,
     'a socket': _socket,
     'a device': _device,
     'a link to itself': _loop,
+    'a link to nothing': _link_to_nothing,
     'a folder for a file': _folder_for_file,
     'a folder in a circle': _folder_in_a_circle,
     'not readable': _unreadable,
