@@ -421,6 +421,24 @@ def test_stop_ends_a_player_that_waits() -> None:
     assert time.monotonic() - began < 5.0
 
 
+@pytest.mark.parametrize('rate', [0.0, 2.0])
+def test_a_gap_in_the_recording_is_told(rate: float) -> None:
+    """A message of 1970 before the others: it seemed to hang, and would have for 54 years."""
+    stop, told = threading.Event(), list[str]()
+
+    def warn(text: str) -> None:
+        told.append(text)
+        stop.set()
+
+    threading.Timer(10.0, stop.set).start()
+    player = Player(lambda m: None, Pacer(rate), Answers(has_depth=True), warn=warn)
+    messages = [Message('/info', 0, b'i'), *recording(1, 0), Message('/info', 1_700 * 10**9, b'i')]
+    assert player.play(messages, stop) == (rate == 0)
+    assert player.progress.messages == (5 if rate == 0 else 4)
+    assert len(told) == (rate > 0)
+    assert all(text.startswith('the next message, of /info, is due in 849 s: ') for text in told)
+
+
 def test_prefetch_hands_over_items_then_the_error() -> None:
     def broken() -> Iterator[int]:
         yield 1

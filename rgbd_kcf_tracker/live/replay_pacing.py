@@ -57,6 +57,10 @@ class Pacer:
             return now
         return due
 
+    def left(self, time_ns: int) -> float:
+        """Seconds until the message recorded at ``time_ns`` is due."""
+        return self.due(time_ns) - self._now()
+
     def recorded(self) -> int | None:
         """The recorded time that it is now; None before the first message."""
         if self._origin is None:

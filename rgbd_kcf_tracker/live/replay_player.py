@@ -25,6 +25,8 @@ RECENT = 8
 """Images that are kept for sending again."""
 FRAME_NS = 33_333_333
 """Between two rounds of a single image."""
+GAP_S = 10.0
+"""Seconds without a message of which a person is told: one that waits for years seems to hang."""
 LONGEST_NS = 1_000_000_000
 """Between two rounds, at most: the last images may be far from each other."""
 
@@ -89,6 +91,12 @@ class Player:
         self._pacer.reset(self._period_ns if self.progress.rounds else 0)
         with prefetched(messages) as ahead:
             for message in ahead:
+                if (left := self._pacer.left(message.time_ns)) > GAP_S:
+                    self._warn(
+                        f'the next message, of {message.topic}, is due in {left:.0f} s: the '
+                        'recording has a gap there. Begin behind it (start:=SECONDS), or do not '
+                        'wait (rate:=0.0)'
+                    )
                 if not self._pacer.wait(message.time_ns, stop, self._tick):
                     return False
                 self._tick(message.time_ns)
