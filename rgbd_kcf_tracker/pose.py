@@ -13,6 +13,9 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.errors import ParameterError
 
+FARTHEST = 1e9
+"""Metres: beyond is no frame of a robot, and what is reckoned with it overflows."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
@@ -51,13 +54,16 @@ class Pose:
         """The pose that ROS writes as a quaternion ``(x, y, z, w)`` and metres.
 
         Raises:
-            ParameterError: where the quaternion is not of length 1, as one that was never set is.
+            ParameterError: where the quaternion is not of length 1, as one that was never set is,
+                or the place is farther than :data:`FARTHEST`.
         """
         length = float(np.linalg.norm(quaternion))
         if not abs(length - 1.0) < 1e-2:
             raise ParameterError(
                 f'quaternion {quaternion} has the length {length:g}: a rotation has 1'
             )
+        if max(map(abs, translation)) > FARTHEST:
+            raise ParameterError(f'translation {translation} is farther than {FARTHEST:g} m')
         x, y, z, w = (value / length for value in quaternion)
         matrix = [
             [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

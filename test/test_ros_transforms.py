@@ -234,6 +234,26 @@ def test_tf_that_jumps_is_left_out_where_it_jumps(rig: Rig) -> None:
     assert len(rig.boxes) == 10
 
 
+def test_tf_that_is_farther_than_any_robot_pauses(rig: Rig) -> None:
+    """It overflowed: an internal error, with each image."""
+    base = Base(rig)
+    with running_node(
+        rig, queue_policy='all', init_box=box_text(), target_frame='odom', fixed_frame='odom'
+    ) as node:
+        base.listened()
+        base.mount()
+        for index in range(5):
+            base.stand(stamp_of(index), x=1.7e308, turn=30.0 * index)
+        settled(rig, node, 'odom', stamp_of(4))
+        rig.play(range(5))
+        assert rig.positions == []
+        assert rig.box().iou(scene(4)[2]) > 0.6
+        values = rig.fresh_values()
+        assert int(values['tf_missing']) == 5
+        assert 'is farther than 1e+09 m' in values['last_error']
+        assert 'internal_errors' not in values
+
+
 @pytest.mark.parametrize(('scenario', 'stuck'), [('camera_motion', True), ('normal', False)])
 def test_a_camera_that_moves_while_tf_stands_still_is_noticed(
     rig: Rig, scenario: str, stuck: bool

@@ -152,3 +152,8 @@ def test_quaternions_are_those_of_scipy() -> None:
         Pose.from_quaternion((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     with pytest.raises(ParameterError, match='length nan'):
         Pose.from_quaternion((math.nan, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    for far in (-1e10, 1.7e308, math.inf):
+        with pytest.raises(ParameterError, match=r'is farther than 1e\+09 m'):
+            Pose.from_quaternion((0.0, 0.0, 0.0, 1.0), (0.0, far, 0.0))
+    with pytest.raises(ParameterError, match='not finite'):
+        Pose.from_quaternion((0.0, 0.0, 0.0, 1.0), (0.0, math.nan, 0.0))
