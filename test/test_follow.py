@@ -362,6 +362,35 @@ def test_a_target_is_followed_while_it_is_there_and_no_longer() -> None:
 
 @pytest.mark.ros
 @pytest.mark.timeout(120)
+def test_a_tracker_that_does_not_answer_is_told_once(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It followed nobody for ever, and did not say that its tracker has another name."""
+    from rgbd_kcf_tracker.ros import follow_node
+
+    monkeypatch.setattr(follow_node, 'SILENCE_S', 0.5)
+    said = ''
+
+    def until_said(what: str) -> None:
+        nonlocal said
+        end = time.monotonic() + 20
+        while what not in said:
+            assert time.monotonic() < end, said
+            time.sleep(0.05)
+            said += capfd.readouterr().err
+
+    with running(Server()) as (node, camera):
+        until_said('nobody publishes /tracker/box: is the tracker running')
+        tracker = FakeTracker(camera)
+        tracker.until(lambda: node.active, seen=True)
+        until_said('no answer on /tracker/box: is the tracker active')
+        time.sleep(1.2)
+    said += capfd.readouterr().err
+    assert said.count('/tracker/box') == 2
+
+
+@pytest.mark.ros
+@pytest.mark.timeout(120)
 def test_a_server_that_is_not_there_or_refuses_and_a_node_that_ends() -> None:
     from std_srvs.srv import Trigger
 

@@ -25,9 +25,12 @@ from rgbd_kcf_tracker.live.following import Following, FollowParameters
 from rgbd_kcf_tracker.parameters import describe
 from rgbd_kcf_tracker.ros.names import full_name, tracker_topics
 from rgbd_kcf_tracker.ros.parameters import DECLARE_OVERRIDES, declare_all
+from rgbd_kcf_tracker.ros.unheard import unheard
 
 PERIOD_S = 0.1
 SAY_AGAIN_S = 10.0
+SILENCE_S = 3.0
+"""Seconds without an answer after which it is said why: a tracker takes two to start."""
 ASKING_S = 5.0
 """Seconds for which the server may think about a goal."""
 ANSWER_S = 0.5
@@ -97,7 +100,11 @@ class FollowNode(Node):
         light = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
         # Of one answer, the box comes last.
         self.create_subscription(Bool, f'{tracker}/occluded', self._on_occluded, light)
-        self.create_subscription(PolygonStamped, f'{tracker}/box', self._on_box, light)
+        self._boxes = self.create_subscription(
+            PolygonStamped, f'{tracker}/box', self._on_box, light
+        )
+        # None once it is said that no answer comes.
+        self._heard_at: float | None = time.monotonic()
         self.create_service(Trigger, '~/start', self._start)
         self.create_service(Trigger, '~/stop', self._stop)
         self.create_timer(PERIOD_S, self._tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -113,7 +120,22 @@ class FollowNode(Node):
         self._hidden = bool(message.data)
 
     def _on_box(self, message: PolygonStamped) -> None:
-        self.following.answer(time.monotonic(), len(message.polygon.points) > 0, self._hidden)
+        self._heard_at = now = time.monotonic()
+        self.following.answer(now, len(message.polygon.points) > 0, self._hidden)
+
+    def _tell_silence(self, now: float) -> None:
+        """Say once that no answer of the tracker comes, and what mends it."""
+        if self._heard_at is None or now - self._heard_at < SILENCE_S:
+            return
+        self._heard_at, topic = None, self._boxes.topic_name
+        if not self.count_publishers(topic):
+            why = f'nobody publishes {topic}: is the tracker running, does the parameter tracker '
+            why += 'name it with its namespace?'
+        else:
+            why = unheard(self, self._boxes, 'set the parameter tracker', '') or (
+                f'no answer on {topic}: is the tracker active, do its images come? See /diagnostics'
+            )
+        self.get_logger().warning(why)
 
     def _start(self, request: Any, response: Any) -> Any:
         self.following.asked = True
@@ -134,6 +156,7 @@ class FollowNode(Node):
 
     def _tick(self) -> None:
         now = time.monotonic()
+        self._tell_silence(now)
         ready = self._client.server_is_ready()
         if self.active and not (ready and self._servers == self._servers_now()):
             # Neither its answer nor its result would ever come. If only the way to it was cut, it
