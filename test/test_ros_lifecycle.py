@@ -342,6 +342,17 @@ def test_integers_for_doubles_and_lists_for_boxes_are_taken(rig: Rig) -> None:
         assert node.get_parameter('kcf.padding').value == 3.0
 
 
+def test_a_parameter_that_nobody_declared_is_named(rig: Rig) -> None:
+    """rclpy itself names it "[]"."""
+    with running_node(rig) as node:
+        refused = set_parameter(rig, 'kcf.paddding', 3.0)
+        assert not refused.successful
+        assert "unknown parameter 'kcf.paddding': did you mean 'kcf.padding'?" in refused.reason
+        assert set_parameter(rig, 'use_sim_time', False).successful
+        node.declare_parameter('later', 1)
+        assert set_parameter(rig, 'later', 2).successful
+
+
 def test_generated_files_are_up_to_date() -> None:
     assert outdated(PROJECT) == [], 'run python -m rgbd_kcf_tracker.bench.generated'
 

@@ -21,6 +21,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -127,11 +128,14 @@ class ParameterServer:
     def _before_set(self, parameters: Sequence[Parameter]) -> list[Parameter]:
         """Take an integer for a double and a list for a box, before rclpy compares the types.
 
-        What it then is, in range or not, is refused with its reason: by _on_set, or by rclpy.
+        What it then is, in range or not, is refused with its reason: by _on_set, or by rclpy, which
+        of what nobody declared does not say the name.
         """
         taken = []
         for given in parameters:
             info = self._infos.get(given.name)
+            if info is None and not self._node.has_parameter(given.name):
+                raise ParameterNotDeclaredException(unknown(given.name, self._infos))
             value = given.value if info is None else _of_type(info, given.value)
             if value is not given.value:
                 given = Parameter(given.name, value=value)
