@@ -353,6 +353,18 @@ def test_a_parameter_that_nobody_declared_is_named(rig: Rig) -> None:
         assert set_parameter(rig, 'later', 2).successful
 
 
+def test_two_of_one_name_are_told(rig: Rig) -> None:
+    """Who listened had the answers of both, in turn, and nobody said a word."""
+    with running_node(rig, queue_policy='all', init_box=box_text(0)):
+        rig.play([0])
+        assert 'somebody else' not in rig.fresh_values()['message']
+        with running_node(rig):
+            rig.play([1])
+            told = 'somebody else publishes /tracker/box, too'
+            rig.wait(lambda: told in rig.values().get('message', ''), 10.0, told)
+        rig.wait(lambda: told not in rig.values()['message'], 10.0, 'its end')
+
+
 def test_generated_files_are_up_to_date() -> None:
     assert outdated(PROJECT) == [], 'run python -m rgbd_kcf_tracker.bench.generated'
 

@@ -36,7 +36,8 @@ class NodeState:
         uses_depth: whether the variant wants depth at all.
         depth_fault: why no depth fits, in words; empty where it does.
         auto_init_fault: why nobody can be chosen by itself, likewise.
-        unheard: by input, why one who publishes there is not heard, and what mends it.
+        unheard: by input, why one who publishes there is not heard, and what mends it; by output,
+            who else publishes there.
     """
 
     name: str

@@ -408,7 +408,7 @@ class TrackerNode(LifecycleNode):
         self._unheard, self._unheard_told = now, lasting
 
     def _unheard_now(self, snapshot: Snapshot) -> dict[str, str]:
-        """Why nothing comes on inputs on which somebody publishes."""
+        """Why nothing comes on inputs on which somebody publishes, and who answers beside us."""
         if self._session is None or self._inputs is None or self._intake is None:
             return {}
         ages = {COLOR: snapshot.image_age_s}
@@ -419,6 +419,12 @@ class TrackerNode(LifecycleNode):
         if not self._intake.camera_known:
             silent.append(CAMERA_INFO)
         found = {name: self._inputs.unheard(name) for name in silent}
+        answers = self.resolve_topic_name('~/box')
+        if self.count_publishers(answers) > 1:
+            found['~/box'] = (
+                f'somebody else publishes {answers}, too: does another tracker run under this '
+                'name, or is one replayed?'
+            )
         return {name: why for name, why in found.items() if why}
 
     def _state(self, snapshot: Snapshot) -> NodeState:
