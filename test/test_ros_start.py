@@ -20,7 +20,9 @@ import pytest
 pytest.importorskip('rclpy', reason="needs ROS 2: pip install '.[ros]'")
 
 import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
+from rclpy.node import Node
 
 from rgbd_kcf_tracker.ros import (
     follow_main,
@@ -31,6 +33,7 @@ from rgbd_kcf_tracker.ros import (
     tracker_node,
     viewer_main,
 )
+from rgbd_kcf_tracker.ros.process import spin
 
 pytestmark = pytest.mark.ros
 
@@ -235,6 +238,24 @@ def test_interrupted_while_it_starts_it_ends_without_a_word(library: str) -> Non
     status, output = stop_after(0.0, loaded)
     assert status == 0, output
     assert 'Traceback' not in output
+
+
+def test_what_raises_at_any_rate_is_logged_now_and_then(capfd: pytest.CaptureFixture[str]) -> None:
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=int(os.environ['ROS_DOMAIN_ID']))
+    node, executor = Node('raises', context=context), SingleThreadedExecutor(context=context)
+    raised: list[ValueError] = []
+
+    def wrong() -> None:
+        raised.append(ValueError('wrong'))
+        raise raised[-1]
+
+    node.create_timer(0.001, wrong)
+    executor.add_node(node)
+    spin(executor, node, lambda: len(raised) > 50)
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+    assert capfd.readouterr().err.count('ValueError: wrong') == 1
 
 
 def test_nodes_use_only_what_rclpy_makes_public() -> None:

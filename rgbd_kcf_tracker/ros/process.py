@@ -23,13 +23,15 @@ N = TypeVar('N', bound='Node')
 
 USER_MISTAKE, FAILURE = 2, 1
 _SPIN_PERIOD_S = 0.25
+SAY_AGAIN_S = 5.0
+"""A clock of negative seconds, a thousand times a second, would fill the disk with its error."""
 
 
 def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
     """Run callbacks until ``stopped`` or the context ends; what a callback raises is logged.
 
     A message whose strings are no UTF-8, or a lifecycle request that does not fit the state, raises
-    inside rclpy: it must not end the node.
+    inside rclpy: it must not end the node, nor fill the log.
     """
     from rclpy.executors import ExternalShutdownException, ShutdownException
 
@@ -39,7 +41,9 @@ def spin(executor: Executor, node: Node, stopped: Callable[[], bool]) -> None:
         except (ExternalShutdownException, ShutdownException):
             break
         except Exception as error:
-            node.get_logger().error(f'{type(error).__name__}: {error}')
+            node.get_logger().error(
+                f'{type(error).__name__}: {error}', throttle_duration_sec=SAY_AGAIN_S
+            )
 
 
 def ends_at_once(parser: argparse.ArgumentParser, arguments: Sequence[str] | None) -> int | None:
