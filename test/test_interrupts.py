@@ -27,7 +27,7 @@ from rgbd_kcf_tracker.cli.interrupts import interrupts
 from rgbd_kcf_tracker.cli.main import main
 from rgbd_kcf_tracker.evaluation import jobs, report, runner, speed
 from rgbd_kcf_tracker.live.stopping import Stop
-from rgbd_kcf_tracker.recordings import open_recording
+from rgbd_kcf_tracker.recordings import mcap_writer, open_recording
 
 SMALL = ['--size', '160x90', '--duration', '1']
 
@@ -400,3 +400,17 @@ def test_results_are_kept_as_long_as_the_libraries(
         assert code.environment().digest != before.digest
     code.environment.cache_clear()
     assert code.environment() == before
+
+
+def test_ctrl_c_while_a_bag_is_begun_leaves_no_empty_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """What came up while the writer's libraries were imported comes again there."""
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(mcap_writer, 'Writer', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        mcap_writer.McapWriter(tmp_path / 'a.mcap')
+    assert not list(tmp_path.iterdir())

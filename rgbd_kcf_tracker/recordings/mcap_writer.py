@@ -65,6 +65,9 @@ class McapWriter(FrameWriter):
         except OSError as error:
             self.output.end(whole=False, anything=False)
             raise RecordingError(cannot_write(self.path, error)) from None
+        except BaseException:  # Ctrl-C, and nobody else knows of the file yet
+            self.output.end(whole=False, anything=False)
+            raise
 
     def write(self, topic: str, message: Any, log_ns: int) -> None:
         """Write a message of rosbags' ROS 2 typestore.
