@@ -2243,12 +2243,22 @@ def test_who_touches_a_cupboard_of_his_depth_is_chosen_without_it():
         assert track.box.iou(shows) > 0.7
 
 
+def finds(look: Look | None):
+    """A step of a look that finds just that."""
+
+    def step(by_look: ByLook, frame: Frame, dt: float, *args: object) -> Look | None:
+        by_look.unseen += dt
+        return look
+
+    return step
+
+
 @pytest.mark.parametrize('own', [False, True])
 def test_who_comes_in_where_a_strip_was_chosen_is_the_target_if_he_has_its_colours(
     own: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """At the side of the image there is no depth; more of him shows than was chosen."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     for i in range(8):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
@@ -2268,7 +2278,7 @@ def test_who_comes_in_far_larger_than_who_was_chosen_passes_before_the_target(
     near: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """A passer at a metre, in colours like the target's at four, was the target at 0.99."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     chosen = Someone(-2.3, 4.4)
     for i in range(8):
@@ -2289,7 +2299,7 @@ def test_who_was_chosen_far_off_may_have_come_near_since(
 ):
     """He is three times as high: a frame a second, he has walked for three; else he passes."""
     look = Look(Someone(-2.1, 4.4).box, 0.95, 0.95, None)
-    monkeypatch.setattr(ByLook, 'step', lambda *args: look)
+    monkeypatch.setattr(ByLook, 'step', finds(look))
     tracker = create_tracker('metric')
     for i in range(4):
         one = Someone(-0.58, 1.3) if i == 3 else Someone(-2.1, 4.4)
@@ -2309,7 +2319,7 @@ def test_who_has_taken_a_step_before_depth_shows_him_is_the_target(
     pace: float, own: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """He was chosen where depth sees nothing, and his look was lost; nobody runs at 5 m/s."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     for i in range(8):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
@@ -2338,7 +2348,7 @@ def test_what_the_target_stood_before_is_not_it_where_who_has_come_from_there_ma
             chosen = one.box
             tracker.start(frame, chosen)
             look = Look(chosen, ratio, ratio, None)
-            monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+            monkeypatch.setattr(ByLook, 'step', finds(look))
         track = tracker.update(frame)
     assert track.box is not None
     assert track.box.iou(one.box if ratio < 0.7 else chosen) > 0.9
@@ -2358,7 +2368,7 @@ def test_the_wall_that_somebody_stood_before_where_depth_ends_is_not_he(
         if i == 0:
             tracker.start(frame, one.box)
             look = Look(one.box, 0.95, 0.95, None)
-            monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+            monkeypatch.setattr(ByLook, 'step', finds(look))
         else:
             track = tracker.update(frame)
             assert (track.box is None) == gone
@@ -2448,7 +2458,7 @@ def test_whoever_has_passed_beside_who_has_no_reading_is_not_he(
             continue
         beside = passer.box.intersection(one.box) == 0
         found = Look(one.box, 0.9, 0.9, None) if beside else Look(passer.box, 0.9, 0.9, passer.z)
-        monkeypatch.setattr(ByLook, 'step', lambda *args, found=found: found)
+        monkeypatch.setattr(ByLook, 'step', finds(found))
         track = tracker.update(frame)
         assert (track.box is not None) == beside
     assert not beside
@@ -2464,7 +2474,7 @@ def test_who_passes_before_who_has_no_reading_and_looks_unlike_him_is_not_he(
         passes = i > 3
         frame = picture([one, passer] if passes else [one], 0.1 * i, unread=one)
         found = Look(passer.box, 0.9, 0.9, 2.0) if passes else Look(one.box, 0.9, 0.9, None)
-        monkeypatch.setattr(ByLook, 'step', lambda *args, found=found: found)
+        monkeypatch.setattr(ByLook, 'step', finds(found))
         track = tracker.start(frame, one.box) if i == 0 else tracker.update(frame)
         assert (track.box is None) == passes
 
@@ -2474,7 +2484,7 @@ def test_who_comes_where_somebody_was_drawn_looks_as_he_did(
     own: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """By colours alone one in a green shirt was he who was drawn in a white one, at 0.99."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     monkeypatch.setattr(
         ByLook, 'own', lambda look, image: np.full(image.shape[:2], 0.9, np.float32)
     )
@@ -2493,7 +2503,7 @@ def test_who_was_drawn_where_depth_shows_nothing_is_known_when_he_comes_back(
     own: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """He was lost for the rest of the recording, as nothing but his look had been known."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     for i in range(12):
         paint = {} if own or i == 0 else {'shirt': GREEN, 'trousers': BLUE}
@@ -2511,7 +2521,7 @@ def test_who_is_known_again_is_followed_once_more_than_a_strip_of_him_shows(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """A strip past somebody else was all of him from then on, and he was lost in full view."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     for i in range(14):
         one = Someone(0.8 - 0.15 * max(i - 4, 0), 4.4 if i == 0 else 2.8)
@@ -2531,7 +2541,7 @@ def test_of_two_who_come_where_the_target_was_it_is_the_one_in_its_colours(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """A frame a second: who came past the doorway it stood in covered more of its box, at 0.99."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     target, other = Someone(0.0, 4.4), Someone(-0.1, 3.2, (60, 60, 170), BLACK)
     tracker.start(picture([target], 0.0, unread=target), target.box)
@@ -2545,7 +2555,7 @@ def test_a_strip_that_shows_where_somebody_was_followed_by_his_look_is_not_he(
     monkeypatch: pytest.MonkeyPatch,
 ):
     """A piece of the wall, a tenth of his box, was he for the rest of the scene."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     one = Someone(0.0, 2.5)
     x, y = round(one.box.cx), round(one.box.cy)
@@ -2564,7 +2574,7 @@ def test_who_comes_between_two_frames_came_in_time_if_the_first_was_in_time(
     silent: int, found: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """A frame a second: the look is lost in the second, depth shows him in the third."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     tracker = create_tracker('metric')
     for i in range(silent + 1):
         one = Someone(-0.5 + 0.1 * i, 3.0)
@@ -2579,7 +2589,7 @@ def test_who_has_the_number_but_not_the_look_of_one_who_stood_beside_may_be_the_
     own: bool, monkeypatch: pytest.MonkeyPatch
 ):
     """Depth showed another; in the next frame he has gone and the target stands where he did."""
-    monkeypatch.setattr(ByLook, 'step', lambda *args: None)
+    monkeypatch.setattr(ByLook, 'step', finds(None))
     monkeypatch.setattr(
         ByLook, 'own', lambda look, image: np.full(image.shape[:2], 0.9, np.float32)
     )
@@ -2642,7 +2652,7 @@ def test_a_look_does_not_go_over_to_who_stood_beside_in_the_first_frame(
 ):
     """Depth shows nothing of the target, but of him, who is somebody else."""
     one, other = Someone(-0.8, 3.5), Someone(0.7, 2.5)
-    monkeypatch.setattr(ByLook, 'step', lambda *args: Look(other.box, 1.0, 1.0, other.z))
+    monkeypatch.setattr(ByLook, 'step', finds(Look(other.box, 1.0, 1.0, other.z)))
     tracker = create_tracker('metric')
     for i in range(6):
         frame = picture([one, other], 0.1 * i, unread=one)
@@ -2894,7 +2904,7 @@ def test_who_was_too_far_to_be_read_when_a_part_of_him_was_chosen_is_followed_wh
         if i < 8:
             depth[depth == one.z] = np.nan
         look = Look(strip, 1.0, 1.0, read if i >= 8 else None)
-        monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+        monkeypatch.setattr(ByLook, 'step', finds(look))
         frame = Frame(color, depth, round(1e8 * i), CAMERA)
         if i == 0:
             number = targets.add(frame, strip)
@@ -2948,7 +2958,7 @@ def test_what_is_like_a_picture_is_another_one_where_that_did_not_hang(
     for i in range(21):
         box = other if i == 20 else hung
         look = Look(box, 0.9, 1.0, WALL) if leaps or not 15 <= i < 20 else None
-        monkeypatch.setattr(ByLook, 'step', lambda *args, look=look: look)
+        monkeypatch.setattr(ByLook, 'step', finds(look))
         color, depth = images([])
         # A wall straight ahead looks the same to a camera that moves along it, but for a little.
         pose = Pose(np.eye(3), np.array([0.005 * max(i - 5, 0), 0.0, 0.0]))

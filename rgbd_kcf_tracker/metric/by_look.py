@@ -124,6 +124,7 @@ class ByLook:
         response: the filter's in the last look against its own recent mean.
         last_box: where the target was found last, in pixels of the newest image.
         last_depth: metres that were read on it there, None where there was no reading.
+        unseen: seconds since then.
     """
 
     def __init__(self, frame: Frame, box: Box, parameters: MetricParameters) -> None:
@@ -155,7 +156,7 @@ class ByLook:
         self._keep(frame)
         self._size_of_image, self._zoom = (frame.width, frame.height), 1.0
         self._hidden = False
-        self._unseen, self._velocity = 0.0, (0.0, 0.0)
+        self.unseen, self._velocity = 0.0, (0.0, 0.0)
         self.last_depth = self._depth
         self._sure = self._scale, self._depth
         self._turn = True
@@ -182,7 +183,7 @@ class ByLook:
         parameters = self._parameters
         self._follow_size(frame)
         self._turn = turn
-        self._unseen += dt
+        self.unseen += dt
         if self._hidden and not turn:
             return None
         self._small = _small(frame)
@@ -226,10 +227,10 @@ class ByLook:
         # What looks unlike, or is nearer, may be another, whose size and way are not the target's.
         goes_on = look.depth is None or as_near(look.depth, self.last_depth)
         self._velocity = 0.0, 0.0
-        if goes_on and self._unseen:
+        if goes_on and self.unseen:
             across, down = look.box.cx - self.last_box.cx, look.box.cy - self.last_box.cy
-            self._velocity = across / self._unseen, down / self._unseen
-        self.last_box, self._unseen = look.box, 0.0
+            self._velocity = across / self.unseen, down / self.unseen
+        self.last_box, self.unseen = look.box, 0.0
         if goes_on and look.ratio > self._parameters.seen_ratio:
             self._sure = self._scale, self._depth
             self._relief = Relief.of(frame, look.box)
@@ -397,7 +398,7 @@ class ByLook:
         depth = frame.depth[np.ix_(v, u)]
         depth = np.where(is_reading(depth), depth, np.float32(np.nan))
         off = np.abs(depth - np.float32(self._depth))
-        near = ~(off > SAME_DEPTH * self._depth + COMES * self._unseen)
+        near = ~(off > SAME_DEPTH * self._depth + COMES * self.unseen)
         return grown(near)
 
     def _ahead(self, frame: Frame, sighting: Sighting) -> Sighting:
@@ -405,9 +406,9 @@ class ByLook:
 
         It is looked for there for a moment, where what was found is not surely the target.
         """
-        if sighting.ratio >= UNSURE or self._unseen > CARRIED:
+        if sighting.ratio >= UNSURE or self.unseen > CARRIED:
             return sighting
-        across, down = (each * self._unseen for each in self._velocity)
+        across, down = (each * self.unseen for each in self._velocity)
         ahead = self._look_at(frame, self.last_box.cx + across, self.last_box.cy + down)
         if ahead.ratio <= max(sighting.ratio, self._parameters.hidden_ratio):
             return sighting
@@ -425,7 +426,7 @@ class ByLook:
 
         What is carried looks less like itself before something else.
         """
-        if self._depth is None or self._unseen > CARRIED or not self._relief.stands_out:
+        if self._depth is None or self.unseen > CARRIED or not self._relief.stands_out:
             return False
         box = self._box_at(sighting)
         depth = depth_in(frame, box)
@@ -433,7 +434,7 @@ class ByLook:
             return False
         camera = frame.intrinsics or Intrinsics.guess(frame.width, frame.height)
         aside = math.hypot(box.cx - self._cx, box.cy - self._cy) * depth / camera.fx
-        in_reach = math.hypot(aside, depth - self._depth) < COMES * self._unseen
+        in_reach = math.hypot(aside, depth - self._depth) < COMES * self.unseen
         return in_reach and Relief.of(frame, box).stands_out
 
     @property

@@ -43,7 +43,6 @@ class Dark:
         self._since, self._parameters = since, parameters
         self._last: _Last | None = None
         self._gated: GatedLook | None = None
-        self._unseen = 0.0
 
     def seen(self, frame: Frame, box: Box, depth: float, score: float) -> None:
         """Take a frame with depth in which the target was found, at ``depth`` metres."""
@@ -53,7 +52,6 @@ class Dark:
     def forget(self) -> None:
         """It has not been found, or something that may be another: nothing is to go on."""
         self._last = self._gated = None
-        self._unseen = 0.0
 
     @property
     def ready(self) -> bool:
@@ -97,8 +95,7 @@ class Dark:
             look = ByLook(before, box, self._parameters)
             self._gated = GatedLook(look, None, box, self._since, self._parameters.seen_ratio)
         found = self._gated.step(frame, None, dt, turn).look
-        self._unseen = 0.0 if found is not None else self._unseen + dt
-        if self._unseen >= SOUGHT:
+        if self._gated.unseen >= SOUGHT:
             self.forget()
         return found
 

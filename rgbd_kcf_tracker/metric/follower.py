@@ -23,7 +23,7 @@ from rgbd_kcf_tracker.metric.decide.evidence import KNOWN_BEFORE, SOMEBODY_NEW
 from rgbd_kcf_tracker.metric.decide.sighting import WHOLE
 from rgbd_kcf_tracker.metric.decide.visible_box import box_about, outline_box
 from rgbd_kcf_tracker.metric.drawn import UNLIKE, unlike, view_in
-from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, GatedLook, room_share
+from rgbd_kcf_tracker.metric.gated_look import ELSEWHERE, IS_ROOM, NEWCOMER, GatedLook, room_share
 from rgbd_kcf_tracker.metric.identity.comeback import EVEN, Comeback, Likely
 from rgbd_kcf_tracker.metric.identity.elsewhere import Elsewhere
 from rgbd_kcf_tracker.metric.identity.gallery import SUREST_PART, Gallery, View
@@ -529,7 +529,7 @@ class Follower:
             self._lock(frame, account, said.onto, self._gated.stood)
             if self._surface is not None:
                 return self._locked(frame, account, NEW_SCORE)
-        if account is not None and said.look is None and self._gated.lost_for > 0:
+        if account is not None and said.look is None and self._gated.unseen >= NEWCOMER:
             known = self._known_by_box(account, self._gated)
             if known is not None:
                 seen, score = known
@@ -555,7 +555,7 @@ class Follower:
                 self.person = self._crowd.chosen_unseen(
                     gated.drawn.gallery,
                     gated.drawn.place,
-                    account.time - gated.lost_for,
+                    account.time - gated.unseen,
                     gated.others(account),
                 )
             return None

@@ -92,7 +92,7 @@ class GatedLook:
         self._look, self._seen_ratio = look, seen_ratio
         about = frozenset[int]() if account is None else _people_about(account, box)
         self._newcomers = Newcomers(account, box, since, about)
-        self._agreed, self._unseen = 0, 0.0
+        self._agreed, self._followed = 0, True
         self._mobile = self._carried = False
         self._began: tuple[tuple[slice, slice], Floats] | None = None
         self._last: Box | None = box
@@ -110,9 +110,9 @@ class GatedLook:
                 self.stood, self._at = Stood(*at), at[0]
 
     @property
-    def lost_for(self) -> float:
-        """Seconds since the target was last found, from :data:`NEWCOMER` on; 0 before."""
-        return self._unseen if self._unseen >= NEWCOMER else 0.0
+    def unseen(self) -> float:
+        """Seconds since the target was last found."""
+        return self._look.unseen
 
     def others(self, account: Account) -> set[int]:
         """Numbers of those who were there before the target was chosen, or seen beside it."""
@@ -133,6 +133,7 @@ class GatedLook:
             self._mobile |= self._has_gone(account)
             if self.stood is not None:
                 self.stood.carried(account.scene.way, dt)
+        self._followed = self.unseen == 0
         look, stood = self._look.step(frame, dt, turn, self._expected(account)), 0.0
         if account is not None:  # in the pixels of now, which the step above has gone over to
             self._last = self._carry(account.scene)
@@ -151,12 +152,10 @@ class GatedLook:
                 stood = self.stood.log_odds(place, sigma)
             if account is not None:
                 self._newcomers.keep(account, look.box)
-            self._unseen, self._carried = 0.0, False
-        else:
-            self._unseen += dt
+            self._carried = False
         onto = None
         # He came at some time since the frame before, that is in time where that was.
-        in_time = self._unseen - dt < NEWCOMER
+        in_time = self.unseen - dt < NEWCOMER
         # What is not where the target stood may be followed, but is not what it is known by.
         if stood < 0:
             self._agreed = 0
@@ -218,7 +217,7 @@ class GatedLook:
 
     def _goes_on(self, account: Account, look: Look) -> bool:
         """Whether depth shows something as near as the target was a frame ago, before the room."""
-        near = self._unseen == 0 and as_near(look.depth, self._look.last_depth)
+        near = self._followed and as_near(look.depth, self._look.last_depth)
         if not near or not self._near_last(look.box):
             return False
         before = account.scene.before[_part(account.scene, look.box)]
@@ -234,7 +233,7 @@ class GatedLook:
 
     def _stood_elsewhere(self, account: Account, look: Look) -> bool:
         """Whether what is found elsewhere is not where the target, which does not move, stood."""
-        followed = self._unseen == 0 and self._near_last(look.box)
+        followed = self._followed and self._near_last(look.box)
         return not followed and self._stood_odds(account, look) < ELSEWHERE
 
     def _stood_odds(self, account: Account, look: Look) -> float:
@@ -308,7 +307,7 @@ class GatedLook:
     def _onto(self, account: Account, look: Look | None, dt: float) -> Box | None:
         """The box of a surface that has borne out the look, or of somebody new who is there."""
         if self.stood is None or not self.stood.known:  # what stands still does not come
-            unseen = dt if self._may_have_gone(look) else self._unseen
+            unseen = dt if self._may_have_gone(look) else self.unseen
             newcomer = self._newcomers.find(account, self._look, look, unseen, self.drawn)
             if newcomer is not None:
                 return newcomer
