@@ -26,7 +26,7 @@ from rgbd_kcf_tracker.metric.identity.elsewhere import MIDDLE
 from rgbd_kcf_tracker.metric.identity.stood import Stood
 from rgbd_kcf_tracker.metric.initialisation import LOCK_IOU, SAME_OUTLINE, whole_of
 from rgbd_kcf_tracker.metric.newcomers import Newcomers
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, DepthView
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
 from rgbd_kcf_tracker.metric.perceive.figures import DEPTH_STEP
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -52,8 +52,6 @@ next frame at 1 Hz, late ones as well; afterwards anybody may have come."""
 READ = 0.5
 """Share of a box's middle that has depth from which depth tells what is there: half, since what has
 no reading may be the target."""
-NEAREST = 0.2
-"""Metres before the camera from which a place is in the image: nothing is read nearer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Floats
 from rgbd_kcf_tracker.geometry import Box
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView, part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, DepthView, part_in
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 
 
@@ -49,7 +49,7 @@ class ExpectedBody:
 
     def outside(self, scene: Scene) -> float:
         """Share of it that lies beyond the left and right edges of the image."""
-        if self.position[2] < 0.3:
+        if self.position[2] < NEAREST:
             return 1.0
         left, _, right, _ = self.sides(scene.view)
         first, last = scene.rim.left, scene.view.shape[1] - scene.rim.right
@@ -72,7 +72,7 @@ class ExpectedBody:
 
     def box(self, view: DepthView) -> Box | None:
         """The box about it in pixels of the image; None where it is too near to have one."""
-        if self.position[2] < 0.3:
+        if self.position[2] < NEAREST:
             return None
         left, top, right, bottom = (v * view.step for v in self.sides(view))
         return Box.from_corners(left, top, max(right, left + 1), max(bottom, top + 1))

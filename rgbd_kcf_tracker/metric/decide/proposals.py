@@ -19,7 +19,7 @@ from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.geometry import Box
 from rgbd_kcf_tracker.metric.decide.parts import Others
 from rgbd_kcf_tracker.metric.identity.body import Body, Placed
-from rgbd_kcf_tracker.metric.perceive.depth_view import part_in
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, part_in
 from rgbd_kcf_tracker.metric.perceive.figures import LEAST_PIXELS
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
 from rgbd_kcf_tracker.metric.perceive.silhouette import Silhouette
@@ -90,7 +90,7 @@ def _split(scene: Scene, body: Body, expected: Expectation, others: Others) -> l
     view = scene.view
     k = view.intrinsics
     x, y, z = expected.position.tolist()
-    if z < 0.2:
+    if z < NEAREST:
         return []
     area = scene.sizes.area
     large = area > TOO_LARGE * body.area

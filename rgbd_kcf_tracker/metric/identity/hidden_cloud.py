@@ -17,7 +17,8 @@ import numpy as np
 
 from rgbd_kcf_tracker.arrays import FloatArray, Mask
 from rgbd_kcf_tracker.features.sampling import effective_size, systematic_resample
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.identity.person import BEYOND
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, DepthView
 from rgbd_kcf_tracker.pose import Pose
 
 TURN_TIME = np.array([1.2, 0.25, 1.2])
@@ -26,16 +27,9 @@ does not go on for long."""
 ROAM = np.array([0.9, 0.15, 0.9])
 """Metres per second, across, down and ahead, of the velocity that comes instead: along the floor
 together 1.3, nearly a walk (1.4 m/s), and hardly any up or down."""
-EMPTY_MARGIN = 0.3
-"""Metres by which the camera must see past a particle to know that it is not there: a body is 0.2
-to 0.25 m deep, and far readings are off by some centimetres; as for everybody
-(:data:`~.person.BEYOND`)."""
 EMPTY_TIME = 0.12
 """Seconds in which the weight of such a particle falls to a third: some frames at 30 Hz, as one may
 have a wrong reading or a gap between the legs, and nearly at once at 5 Hz."""
-NEAREST = 0.2
-"""Metres before the camera up to which somebody comes; what a camera that turned away has behind
-it is where it is."""
 KERNEL = 0.2
 """Metres of the kernel that makes a density of the particles: about half of a body's width, so that
 some hundreds of them leave no holes where somebody may be."""
@@ -83,6 +77,7 @@ class HiddenCloud:
         self._positions += TURN_TIME * (1 - keep) * self._velocities + turned * (dt / 2)
         self._velocities *= keep
         self._velocities += turned
+        # What a camera that turned away has behind it is where it is.
         z = self._positions[:, 2]
         np.maximum(z, NEAREST, out=z, where=ahead)
 
@@ -118,7 +113,7 @@ class HiddenCloud:
         inside = ahead & (u >= 0) & (u < cols) & (v >= 0) & (v < rows)
         row, column = np.clip(v, 0, rows - 1), np.clip(u, 0, cols - 1)
         seen = view.depth[row.astype(np.intp), column.astype(np.intp)]
-        empty: Mask = inside & (seen > z + EMPTY_MARGIN)
+        empty: Mask = inside & (seen > z + BEYOND)
         return empty
 
     @property

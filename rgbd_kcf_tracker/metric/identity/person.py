@@ -54,8 +54,9 @@ what a camera sees (:data:`ROOM_AREA`)."""
 TRAVELLED = 0.5
 """Metres that a thing which was moved, or the noise of one, does not travel."""
 BEYOND, EMPTY = 0.3, 0.5
-"""Metres behind the last sight of somebody at which the camera sees past its place, and the share
-of its outline where it does so if it has gone."""
+"""Metres behind the last sight of somebody at which the camera sees past its place, as a body is
+0.2 to 0.25 m deep and far readings are off by some centimetres, and the share of its outline where
+it does so if it has gone."""
 JOINED = 0.3
 """Share of an outline that is joined to something large, from which it is of a piece of that and
 not of somebody: of real and simulated people one sighting in five hundred has it, of pieces of

@@ -15,6 +15,8 @@ from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.frame import Frame, is_reading
 from rgbd_kcf_tracker.geometry import Box, Intrinsics
 
+NEAREST = 0.2
+"""Metres before the camera from which anything is seen: nothing is read nearer."""
 SAMPLES = 24
 """Readings along the shorter side of a part of the image: some hundreds are enough for a median,
 and a target that fills the image costs no more."""

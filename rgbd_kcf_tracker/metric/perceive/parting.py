@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import FloatArray, Floats, Mask
-from rgbd_kcf_tracker.metric.perceive.depth_view import DepthView
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, DepthView
 
 BREADTH = 0.4
 """Metres between the heads of two people side by side, at the least: shoulders are about as
@@ -83,7 +83,7 @@ def parted(
     x_of, y_of = right[0] / k.fx, right[1] / k.fy
     seeds, least = expected, APART
     if len(seeds):
-        u = seeds[:, 0] / np.maximum(seeds[:, 1], 0.2) - lines[rows // 2] * y_of
+        u = seeds[:, 0] / np.maximum(seeds[:, 1], NEAREST) - lines[rows // 2] * y_of
         u = u / x_of + k.cx - left
         margin = 0.1 * k.fx / z
         inside = (u > -margin) & (u < cols + margin)

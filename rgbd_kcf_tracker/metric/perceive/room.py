@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from rgbd_kcf_tracker.arrays import Floats, Mask
 from rgbd_kcf_tracker.geometry import Intrinsics
-from rgbd_kcf_tracker.metric.perceive.depth_view import closed
+from rgbd_kcf_tracker.metric.perceive.depth_view import NEAREST, closed
 from rgbd_kcf_tracker.metric.perceive.surfaces import Surfaces
 from rgbd_kcf_tracker.pose import Pose
 
@@ -35,8 +35,6 @@ BLIND_FRAMES = 3
 GONE_FRAMES = 2 * BLIND_FRAMES
 """Frames without a reading after which whatever was known of a pixel is not there any more."""
 _ANY_NUMBER = np.uint8(255 - BLIND_FRAMES)
-NEAREST = 0.15
-"""Metres from the camera below which nothing is seen."""
 BLEND = 0.1
 """Share of a new reading in the room's depth: the mean of some twenty, whose noise is a quarter of
 one's."""

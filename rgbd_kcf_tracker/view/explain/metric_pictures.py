@@ -18,7 +18,7 @@ from rgbd_kcf_tracker.geometry import Box, Intrinsics
 from rgbd_kcf_tracker.insight import COMPUTED_BY, Insight, insight_of
 from rgbd_kcf_tracker.metric.decide.account import REUNION
 from rgbd_kcf_tracker.metric.decide.evidence import CUE_WORDS
-from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud
+from rgbd_kcf_tracker.metric.identity import gallery, hidden_cloud, person
 from rgbd_kcf_tracker.metric.parameters import MetricParameters
 from rgbd_kcf_tracker.track import Track
 from rgbd_kcf_tracker.variants import create_tracker
@@ -340,6 +340,6 @@ def _from_above(seen: _Seen) -> Picture:
             (r'\tau', f'{hidden_cloud.EMPTY_TIME:g} s, in which a weight falls to a third'),
             ('z', 'depth that the camera measures where the particle would be seen, metres'),
             ('z_i', "the particle's own"),
-            ('m', f'{hidden_cloud.EMPTY_MARGIN:g} m, to be sure'), ('e', '2.718…'),
+            ('m', f'{person.BEYOND:g} m, to be sure'), ('e', '2.718…'),
         ),
     )  # fmt: skip
