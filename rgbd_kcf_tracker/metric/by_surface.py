@@ -134,7 +134,7 @@ class BySurface:
         self.body = Body(first)
         left, top, right, _ = first.metres
         here = np.array([(left + right) / 2, top, first.depth])
-        placed = self.body.place(first, scene, here, np.full(3, FIRST_SIGMA))
+        placed = self.body.place(first, here)
         self.motion = self._motion_from(placed)
         self._neighbours: Neighbours | None = Neighbours(parameters.speed, parameters.acceleration)
         self._middle = MiddleFilter()
@@ -429,7 +429,7 @@ class BySurface:
         claim = account.claim(self.person, seen)
         sigma = motion.sigma
         stands = not self.person.lies(scene.top(seen), account.time)
-        placed = body.place(seen, scene, motion.position, sigma, stands)
+        placed = body.place(seen, motion.position)
         variance = np.square(sigma) + np.square(placed.sigma)
         away = np.square(placed.position - motion.position)
         unsure = placed.sigma

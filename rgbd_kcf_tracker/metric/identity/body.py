@@ -97,39 +97,17 @@ class Body:
 
     # -- where a silhouette puts the body ---------------------------------------------------------
 
-    def place(
-        self,
-        seen: Silhouette,
-        scene: Scene,
-        expected: FloatArray,
-        expected_sigma: FloatArray,
-        stands: bool = True,
-    ) -> Placed:
+    def place(self, seen: Silhouette, expected: FloatArray) -> Placed:
         """Take a silhouette as the visible part of the body.
 
-        Args:
-            seen: the silhouette.
-            scene: that it is of.
-            expected: ``(3,)`` metres, where the body's reference point is expected.
-            expected_sigma: ``(3,)`` metres, its deviation.
-            stands: whether it may stand or sit, so that what is above it may be hidden.
+        Its reference point is ``expected`` at ``(3,)`` metres.
         """
         x, x_sigma = self._across(seen, expected[0])
         y, y_sigma = self._top(seen, expected[1])
         z = seen.depth
-        fraction = self._fraction(seen)
-        lower = y - expected[1] > 0.08 * self.height
-        partly = lower and fraction < 0.8 and stands
-        if partly and expected_sigma[1] < 0.3:
-            # The head may be hidden without a nearer surface beside it: see whether the colours
-            # fit the parts lower down.
-            here = band_similarity(self._histograms(seen, scene, y), self._colors)
-            below = self._histograms(seen, scene, expected[1])
-            if band_similarity(below, self._colors) > here:
-                y, y_sigma = float(expected[1]), y_sigma + 0.2 * self.height
         z_sigma = DEPTH_SIGMA + DEPTH_SIGMA_PER_METRE * z
         sigma = np.hypot(WOBBLE, np.array([x_sigma, y_sigma, z_sigma]))
-        return Placed(np.array([x, y, z]), sigma, fraction)
+        return Placed(np.array([x, y, z]), sigma, self._fraction(seen))
 
     def _fraction(self, seen: Silhouette) -> float:
         extent = seen.width * seen.height / (self.width * self.height)
@@ -163,10 +141,6 @@ class Body:
         """First row of the body within the silhouette's crop, and its number of rows."""
         _, row = view.place(0.0, top, seen.depth)
         return row - seen.top, self.height * view.intrinsics.fy / seen.depth
-
-    def _histograms(self, seen: Silhouette, scene: Scene, top: float) -> Floats:
-        rows = self._rows(seen, scene.view, top)
-        return band_histograms(scene.codes[seen.rows, seen.cols], seen.mask, *rows)
 
     def odds_of(self, codes: Codes, seen: Silhouette, view: DepthView, top: float) -> Floats:
         """Log odds that pixels in the rows of a silhouette are the body's, by their colours.
@@ -216,7 +190,8 @@ class Body:
         Those of a band that was not seen before are taken as they are. The body's upper edge is at
         ``top`` metres.
         """
-        counts = self._histograms(seen, scene, top)
+        codes = scene.codes[seen.rows, seen.cols]
+        counts = band_histograms(codes, seen.mask, *self._rows(seen, scene.view, top))
         rate = 1 - float(np.exp(-dt / COLOR_TIME))
         total = counts.sum(axis=1)
         rates = np.where(self._colors.sum(axis=1) == 0, 1.0, rate)
@@ -262,21 +237,3 @@ def _bands_of_rows(count: int, top: float, height: float) -> Codes:
     rows = np.arange(count, dtype=np.float32) + 0.5 - top
     bands = np.clip(rows * (BANDS / max(height, 1.0)), 0, BANDS - 1)
     return np.asarray(bands, np.int32)
-
-
-def band_similarity(counts: Floats, model: Floats) -> float:
-    """Bhattacharyya coefficient of the bands, weighted by how many pixels ``counts`` has in each.
-
-    Args:
-        counts: ``(BANDS, CODES)`` of a candidate.
-        model: ``(BANDS, CODES)`` of the target, each row summing to 1 (or 0 where never seen).
-
-    Returns:
-        0 to 1; 0 where no band of the candidate has been seen on the target.
-    """
-    total = counts.sum(axis=1)
-    known = (total > 0) & (model.sum(axis=1) > 0)
-    if not known.any():
-        return 0.0
-    common = np.sqrt(counts[known] * model[known]).sum(axis=1) / np.sqrt(total[known])
-    return float((common * total[known]).sum() / total[known].sum())
