@@ -328,7 +328,7 @@ def test_who_shows_less_than_before_fades(area: float, missed: bool, hard: float
         assert where is None
     else:
         assert np.array_equal(where, seen.in_view(depth.shape))
-        assert around([lately]) == np.s_[20:120, 50:90]
+        assert around([lately]) == np.s_[18:122, 48:92]
         assert grown(where, ABOUT).sum() == 104 * 44
 
 

@@ -56,12 +56,16 @@ class Lately:
 
 
 def around(lately: Sequence[Lately]) -> tuple[slice, slice]:
-    """Rows and columns of a view that hold all of some, one at the least."""
+    """Rows and columns of a view that hold all of some, one at the least, and what is about them.
+
+    See :data:`ABOUT`.
+    """
     rows, cols = ([each.seen.rows for each in lately], [each.seen.cols for each in lately])
     (top, bottom), (left, right) = (
-        (min(each.start for each in side), max(each.stop for each in side)) for side in (rows, cols)
+        (max(min(each.start for each in side) - ABOUT // 2, 0), max(each.stop for each in side))
+        for side in (rows, cols)
     )
-    return slice(top, bottom), slice(left, right)
+    return slice(top, bottom + ABOUT // 2), slice(left, right + ABOUT // 2)
 
 
 def fading(lately: Sequence[Lately], hardly: Mask) -> Mask | None:

@@ -33,17 +33,20 @@ class Paint:
         self._colors = np.zeros((0, 0, 3), np.float32)
         self._known = np.zeros((0, 0), np.bool_)
 
-    def differs(self, image: Image) -> Mask | None:
+    def differs(self, image: Image, part: tuple[slice, slice] = np.s_[:, :]) -> Mask | None:
         """Where an image looks unlike the room, ``(h, w)`` bool; None where nothing is known.
 
         Args:
             image: ``(h, w, 3)`` uint8 BGR, in the light of those before.
+            part: rows and columns of the view that it shows.
         """
-        if self._known.shape != image.shape[:2]:
+        known = self._known[part]
+        if known.shape != image.shape[:2]:
             return None
-        blue, green, red = cv2.split(cv2.absdiff(image, cv2.convertScaleAbs(self._colors)))
+        room = cv2.convertScaleAbs(self._colors[part])
+        blue, green, red = cv2.split(cv2.absdiff(image, room))
         unlike: Mask = cv2.max(cv2.max(blue, green), red) > DIFFERS
-        unlike &= self._known
+        unlike &= known
         return unlike
 
     def learn(self, image: Image, still: Mask, dt: float) -> None:
@@ -61,7 +64,8 @@ class Paint:
             self._colors, self._known = image.astype(np.float32), still.copy()
             return
         new = still & ~self._known
-        np.copyto(self._colors, image, where=new[:, :, None])
-        self._known |= new
+        if new.any():
+            np.copyto(self._colors, image, where=new[:, :, None])
+            self._known |= new
         share = 1.0 - math.exp(-dt / SETTLE)
         cv2.accumulateWeighted(image, self._colors, share, still.view(np.uint8))

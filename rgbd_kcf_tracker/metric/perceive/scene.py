@@ -237,13 +237,20 @@ class SceneReader:
 
     def _closer(self, image: Image, view: DepthView, lately: Sequence[Lately]) -> Mask | None:
         """See :meth:`Room.update`: what shows about those who fade, unlike the room."""
-        unlike = self._paint.differs(self._light.as_before(image)) if lately else None
+        if not lately:
+            return None
+        part = around(lately)
+        unlike = self._paint.differs(self._light.as_before(image[part]), part)
         if unlike is None:
             return None
-        hardly, part = np.zeros_like(unlike), around(lately)
-        hardly[part] = unlike[part] & self.room.hardly(view.depth, part)
+        hardly = np.zeros(view.shape, np.bool_)
+        hardly[part] = unlike & self.room.hardly(view.depth, part)
         faded = fading(lately, hardly)
-        return None if faded is None else unlike & grown(faded, ABOUT)
+        if faded is None:
+            return None
+        closer = grown(faded, ABOUT)
+        closer[part] &= unlike  # nor is there any of it elsewhere
+        return closer
 
     def _level_after(
         self, floor: Floor | None, view: DepthView, motion: Pose | Lost | None
