@@ -276,7 +276,7 @@ def test_views_with_and_without_a_vector_are_compared_together():
     compared = Compared.of(seen, several)
     said = 12.0 * (np.array([np.nan, np.sqrt(0.5), 0.0]) - 0.5)
     assert compared.network == pytest.approx(said, nan_ok=True, abs=1e-5)
-    assert compared.likeness()[:, 1] == pytest.approx(said, nan_ok=True, abs=1e-5)
+    assert compared.likeness[:, 1] == pytest.approx(said, nan_ok=True, abs=1e-5)
     assert compared.of_each([0, 1])[:, 1] == pytest.approx(
         [np.nan, said[1]], nan_ok=True, abs=1e-5
     ), 'by the nearest of his views, as by colours'
@@ -294,7 +294,7 @@ def test_a_network_tells_two_apart_who_wear_the_same_and_what_is_new_is_told_by_
     gallery.learn(view_of(one, (0, 1)), 1.0)
     assert len(gallery.views) == 1, 'it looks the same, whatever a network says'
     before = gallery.log_odds_before(
-        1.0, view_of(one, (0, 1)), Compared.of(view_of(one, (0, 1)), gallery.looks).likeness()
+        1.0, view_of(one, (0, 1)), Compared.of(view_of(one, (0, 1)), gallery.looks).likeness
     )
     assert before == pytest.approx(other)
 

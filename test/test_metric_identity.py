@@ -269,12 +269,12 @@ def test_views_without_common_parts_say_nothing():
         assert same_person(one, other) == 0.5
         gallery = Gallery.of(one, 0.0)
         assert gallery.looks is not None
-        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness())
+        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness)
         assert gallery.log_odds(other) == before == 0.0
         assert math.isnan(alike(one, other))
         gallery.learn(other, 0.0)
         assert gallery.views == [one, other], 'it shows what was not known'
-        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness())
+        before = gallery.log_odds_before(1.0, other, Compared.of(other, gallery.looks).likeness)
         assert before is not None
         assert (before == 0.0) if other is empty else (before > 1)
     gallery = Gallery()
@@ -543,7 +543,7 @@ def test_what_a_gallery_learned_of_somebody_else_is_taken_back_and_given_to_him(
         gallery.stature.learn(Height(top, 2.0, time))
     green = look(GREEN)
     assert gallery.looks is not None
-    alike = Compared.of(green, gallery.looks).likeness()
+    alike = Compared.of(green, gallery.looks).likeness
     before = gallery.log_odds_before(2.0, green, alike)
     assert before is not None
     assert before < 0 < gallery.log_odds(green)
@@ -1706,20 +1706,24 @@ def test_a_view_that_is_rather_one_of_somebody_who_is_away_is_not_learned(away: 
     assert (len(one.gallery.views) > known) == (not away)
 
 
-def likeness(person: Person, seen: Sequence[View]):
-    """How alike those who are seen are to each view of somebody."""
-    looks = person.gallery.looks
-    if looks is None:
-        return np.zeros((0, len(seen), 2))
-    return np.stack([Compared.of(view, looks).likeness() for view in seen], axis=1)
-
-
-def met(number: int, place: tuple[float, float], seen: Sequence[View], learned: View | None):
-    """Who is seen now as the view of his number, and was known by one view long ago."""
+def met(number: int, place: tuple[float, float], learned: View) -> Person:
+    """Somebody who was known by one view long ago."""
     person = Person(number, np.array(place), 0.0)
-    if learned is not None:
-        person.gallery.learn(learned, 0.0)
-    return Followed(person, person.place, seen[number], number, likeness(person, seen))
+    person.gallery.learn(learned, 0.0)
+    return person
+
+
+def held(people: Sequence[Person], seen: Sequence[View], away: Sequence[Person] = ()):
+    """Those in view, of whom some are seen, and those who are away."""
+    everyone = [*people, *away]
+    looks = Looks.joined([p.gallery.looks for p in everyone if p.gallery.looks is not None])
+    ends = itertools.accumulate((len(p.gallery.views) for p in everyone), initial=0)
+    his = list(itertools.starmap(slice, itertools.pairwise(ends)))
+    here = [
+        Followed(person, person.place, view, Compared.of(view, looks), mine)
+        for person, view, mine in zip(people, seen, his, strict=False)
+    ]
+    return here, list(zip(away, his[len(people) :], strict=True))
 
 
 @pytest.mark.parametrize('chosen', [True, False])
@@ -1763,10 +1767,10 @@ def test_who_came_out_beside_another_and_has_his_number_is_who_was_hidden(
     """In a group one came out behind another who was hidden then, and was he from then on."""
     views = look(looks, looks), look(GREY, GREY)
     known = look(RED, RED), look(GREY, GREY)
-    here = [met(n, (0.5 * n, 3.0), views, known[n]) for n in range(2)]
-    other = Person(2, np.array([0.0, 3.5]), 0.0, chosen)
-    other.gallery.learn(look(hidden, hidden), 0.0)
-    missing = [(other, likeness(other, views))]
+    people = [met(n, (0.5 * n, 3.0), known[n]) for n in range(2)]
+    other = met(2, (0.0, 3.5), look(hidden, hidden))
+    other.chosen = chosen
+    here, missing = held(people, views, [other])
     watch = MixUps()
     times = [10.0 + 0.1 * i for i in range(8)]
     other.seen_at = times[0] - gone
@@ -1801,12 +1805,8 @@ def test_of_one_figure_that_turns_out_to_be_two_he_is_who_looks_as_he_did_before
     newcomer = Person(1, np.array([beside, 4.8]), 10.0)
     watch, said = MixUps(), []
     for time in (10.0 + 0.1 * i for i in range(7)):
-        here = [
-            Followed(who, who.place, views[n], n, likeness(who, views))
-            for n, who in enumerate((one, newcomer))
-            if who.first_seen < time
-        ]
-        said.append(watch.watch(here, [], time))
+        here = [who for who in (one, newcomer) if who.first_seen < time]
+        said.append(watch.watch(*held(here, views), time))
         one.seen_at = newcomer.seen_at = time
     assert not any(said[:3]), 'one sighting is too little'
     if found:
@@ -1829,17 +1829,17 @@ def test_who_comes_in_just_where_another_goes_out_is_somebody_else_if_he_looks_o
     """
     stands = look(GREEN, GREEN)
     views = (dataclasses.replace(stands, top=0.4) if lies else stands,)
-    one = met(0, (0.0, 3.0), views, look(RED, RED))
-    one.person.gallery.stature.learn(Height(1.7, 3.0, 0.0, False))
+    one = met(0, (0.0, 3.0), look(RED, RED))
+    one.gallery.stature.learn(Height(1.7, 3.0, 0.0, False))
     view = DepthView(np.full((60, 80), 3.0, np.float32), 1, CAMERA)
     leg = Silhouette.trimmed(view, 0, 40, np.ones((20, 10), bool), Rim())
     watch, said = MixUps(), []
     watch.watch([], [], 9.9)
-    one.person.seen_at, area = 9.9, left
+    one.seen_at, area = 9.9, left
     for time in (10.0 + 0.1 * i for i in range(8)):
-        one.person.last = dataclasses.replace(leg, area=area)
-        said.append(watch.watch([one], [], time))
-        one.person.seen_at, area = time, 0.5
+        one.last = dataclasses.replace(leg, area=area)
+        said.append(watch.watch(*held([one], views), time))
+        one.seen_at, area = time, 0.5
     assert any(said) == another
 
 

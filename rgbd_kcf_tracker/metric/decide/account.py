@@ -264,7 +264,7 @@ class Account:
                     continue
                 # That somebody looks as he has since he came tells nothing of who he is.
                 view = self.sights[index].view
-                alike = Compared.of(view, other.gallery.looks).likeness()
+                alike = Compared.of(view, other.gallery.looks).likeness
                 came = self.time if self.was_away(other) else other.came
                 look = other.gallery.log_odds_before(came, view, alike)
             if look is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from rgbd_kcf_tracker.arrays import FloatArray, Floats
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.account import RECENT, SAME_AGAIN, Sight
 from rgbd_kcf_tracker.metric.decide.arrivals import away
 from rgbd_kcf_tracker.metric.identity.gallery import Compared, Looks
@@ -35,7 +35,7 @@ def log_odds(
     time: float,
     against: float,
     joined: Callable[[tuple[Looks, ...]], Looks],
-) -> tuple[FloatArray, FloatArray, list[Floats]]:
+) -> tuple[FloatArray, FloatArray, list[Compared]]:
     """Of ``m`` people being ``n`` sights, by place, look and height.
 
     Args:
@@ -47,20 +47,19 @@ def log_odds(
         joined: :meth:`Looks.joined`, or what remembers what that gave.
 
     Returns:
-        ``(m, n)`` log-odds, the same by the look and the height alone, and for each of the people
-        ``(v, n, 2)`` likeness to each of his views.
+        ``(m, n)`` log-odds, the same by the look and the height alone, and each of the sights held
+        against all views of all of the people; nothing where there is none.
     """
     odds = np.zeros((len(people), len(sights)))
     looks = np.zeros_like(odds)
-    alike = np.zeros((0, len(sights), 2), np.float32)
+    compared: list[Compared] = []
     if not odds.size:
-        return odds, looks, [alike] * len(people)
+        return odds, looks, compared
     known = tuple(p.gallery.looks for p in people if p.gallery.looks is not None)
     best: list[list[list[float]]] = []
     if known:
         everyone = joined(known)
         compared = [Compared.of(sight.view, everyone) for sight in sights]
-        alike = np.stack([each.likeness() for each in compared], axis=1)
         starts = np.cumsum([0] + [len(each) for each in known[:-1]]).tolist()
         best = np.stack([each.of_each(starts) for each in compared], axis=1).tolist()
     rows = iter(best)
@@ -80,8 +79,7 @@ def log_odds(
         grown = (person.gallery.stature.top or 0.0) > GROWN
         if grown and low.any() and time - person.seen_at > RECENT:
             odds[row, low] = NEW - 1  # nor does he come back as a desk
-    ends = np.cumsum([len(p.gallery.views) for p in people])
-    return odds, looks, np.split(alike, ends[:-1])
+    return odds, looks, compared
 
 
 def assigned(odds: FloatArray) -> list[int]:

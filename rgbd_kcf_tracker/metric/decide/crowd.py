@@ -9,10 +9,11 @@ import dataclasses
 import math
 from collections.abc import Callable, Collection
 from functools import lru_cache
+from itertools import accumulate, pairwise, starmap, zip_longest
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray, Floats
+from rgbd_kcf_tracker.arrays import FloatArray
 from rgbd_kcf_tracker.metric.decide.account import (
     MISSES,
     RECENT,
@@ -32,7 +33,7 @@ from rgbd_kcf_tracker.metric.decide.visible_box import box_about
 from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.comeback import Comeback
 from rgbd_kcf_tracker.metric.identity.describer import Describer
-from rgbd_kcf_tracker.metric.identity.gallery import Gallery, Looks
+from rgbd_kcf_tracker.metric.identity.gallery import Compared, Gallery, Looks
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.stature import LEVEL, Tilt
 from rgbd_kcf_tracker.metric.perceive.ego_motion import Lost
@@ -256,8 +257,8 @@ class Crowd:
         still = scene.stood_for >= SETTLE
         tilt = Tilt.told_by(p.gallery.stature for p in self.people) if still else LEVEL
         sights = [_in_step(sight, recent, expected, time, tilt) for sight in sights]
-        account, alike = self._explained(scene, sights, time)
-        mixed_up = self._mix_ups.watch(*_followed(account, alike), time)
+        account, compared = self._explained(scene, sights, time)
+        mixed_up = self._mix_ups.watch(*_followed(account, compared), time)
         if mixed_up is not None:
             self._exchange(*mixed_up)
             account, _ = self._explained(scene, sights, time)
@@ -295,12 +296,12 @@ class Crowd:
 
     def _explained(
         self, scene: Scene, sights: list[Sight], time: float
-    ) -> tuple[Account, list[Floats]]:
-        """The account, and the ``(v, n, 2)`` likeness of its sights to each one's views."""
+    ) -> tuple[Account, list[Compared]]:
+        """The account, and each of its sights held against all views, if there are any."""
         against = self._arrivals.against(
             Arrival(time - p.seen_at, p.again) for p in self.people if p.alive
         )
-        odds, looks, alike = log_odds(self.people, scene, sights, time, against, self._joined)
+        odds, looks, compared = log_odds(self.people, scene, sights, time, against, self._joined)
         account = Account(
             scene,
             time,
@@ -326,7 +327,7 @@ class Crowd:
                     met = [person.number in self.people[row].met for person in self.people]
                     odds_of_here[met, column] = NEW - 1
             account.owner = assigned(odds_of_here)
-        return account, alike
+        return account, compared
 
     def _compare(self, account: Account, row: int, column: int) -> None:
         """Compare a sight of one person with those who have been away since he came."""
@@ -498,21 +499,23 @@ def _in_step(
 
 
 def _followed(
-    account: Account, alike: list[Floats]
-) -> tuple[list[Followed], list[tuple[Person, Floats]]]:
+    account: Account, compared: list[Compared]
+) -> tuple[list[Followed], list[tuple[Person, slice]]]:
     """Those in view who are known, and those who are not in view, for :class:`MixUps`.
 
     Args:
         account: of the frame.
-        alike: for each of its people, ``(v, n, 2)``, see :func:`~.association.log_odds`.
+        compared: its sights, see :func:`~.association.log_odds`.
     """
+    ends = accumulate((len(person.gallery.views) for person in account.people), initial=0)
+    views = list(starmap(slice, pairwise(ends)))
     here = [
-        Followed(account.people[row], sight.place, sight.view, column, alike[row])
-        for column, (row, sight) in enumerate(zip(account.owner, account.sights, strict=True))
+        Followed(account.people[row], sight.place, sight.view, held, views[row])
+        for row, sight, held in zip_longest(account.owner, account.sights, compared)
         if row >= 0
     ]
     gone = [
-        (person, alike[row])
+        (person, views[row])
         for row, person in enumerate(account.people)
         if row not in account.owner and person.alive and person.gallery.views
     ]

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rgbd_kcf_tracker.arrays import FloatArray, Floats
-from rgbd_kcf_tracker.metric.identity.gallery import View
+from rgbd_kcf_tracker.arrays import FloatArray
+from rgbd_kcf_tracker.metric.identity.gallery import Compared, View
 from rgbd_kcf_tracker.metric.identity.person import Person
 from rgbd_kcf_tracker.metric.identity.tally import Tally
 
@@ -53,16 +53,15 @@ class Followed(NamedTuple):
         person: who he is taken for.
         place: ``(2,)`` metres across and along the floor.
         view: his look.
-        column: of his sight.
-        alike: ``(v, n, 2)`` likeness of each of the ``n`` sights to each view of his gallery, see
-            :meth:`~rgbd_kcf_tracker.metric.identity.gallery.Compared.likeness`.
+        compared: it, held against all views of all who are known; None where there is none.
+        mine: which of these are of his gallery.
     """
 
     person: Person
     place: FloatArray
     view: View
-    column: int
-    alike: Floats
+    compared: Compared | None
+    mine: slice
 
 
 class MixUp(NamedTuple):
@@ -102,14 +101,13 @@ class MixUps:
         self._time, self._counts = 0.0, 1.0
 
     def watch(
-        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Floats]], time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, slice]], time: float
     ) -> MixUp | None:
         """Take the next frame.
 
         Args:
             here: all in view, before this sight is learned.
-            gone: those who are not, and of whom a view is known, each with the likeness to his
-                views, as for those in view.
+            gone: those who are not, and of whom a view is known, each with which are his.
             time: seconds.
 
         Returns:
@@ -148,23 +146,22 @@ class MixUps:
         return found
 
     def _came_out(
-        self, here: Sequence[Followed], gone: Sequence[tuple[Person, Floats]], time: float
+        self, here: Sequence[Followed], gone: Sequence[tuple[Person, slice]], time: float
     ) -> MixUp | None:
         """Who has the number of somebody whom he came out beside, and who is hidden now himself."""
-        hidden = [(who, alike) for who, alike in gone if time - who.seen_at < HIDDEN_FOR]
+        hidden = [(who, his) for who, his in gone if time - who.seen_at < HIDDEN_FOR]
         tallies: dict[tuple[int, int], Tally] = {}
         found = None
         for one in here:
-            for other, alike in hidden if one.person.number in self._near else ():
+            for other, his in hidden if one.person.number in self._near else ():
                 since = other.seen_at
                 if other.out_of_reach(one.place, time):
                     continue
                 taken = _by_before(one, one, since)
-                if taken is None:
+                if taken is None or one.compared is None:
                     continue
-                odds = other.gallery.log_odds(
-                    one.view, np.fmax.reduce(alike[:, one.column]).tolist()
-                )
+                alike = np.fmax.reduce(one.compared.likeness[his]).tolist()
+                odds = other.gallery.log_odds(one.view, alike)
                 key = one.person.number, other.number
                 said = tallies[key] = self._hidden.get(key) or Tally()
                 said.add(min(odds, odds - taken), self._counts * one.view.shows, time)
@@ -210,10 +207,10 @@ def _by_before(one: Followed, seen: Followed, since: float) -> float | None:
 
     None where nothing was, or where he cannot be compared: in who lies nothing is where it was.
     """
-    gallery = one.person.gallery
-    if not gallery.stands(seen.view.top, seen.view.leans):
+    gallery, compared = one.person.gallery, seen.compared
+    if compared is None or not gallery.stands(seen.view.top, seen.view.leans):
         return None
-    return gallery.log_odds_before(since, seen.view, one.alike[:, seen.column])
+    return gallery.log_odds_before(since, seen.view, compared.likeness[one.mine])
 
 
 def _all_but_out(person: Person) -> bool:
@@ -223,7 +220,9 @@ def _all_but_out(person: Person) -> bool:
 
 def _near(here: Sequence[Followed]) -> list[int]:
     """Numbers of those who are near somebody else."""
-    places = np.array([one.place for one in here]).reshape(-1, 2)
+    if len(here) < 2:
+        return []
+    places = np.stack([one.place for one in here])
     apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
     near = np.count_nonzero(apart < NEAR, axis=1) > 1  # everybody is near himself
     return [here[i].person.number for i in np.flatnonzero(near).tolist()]

@@ -247,7 +247,7 @@ _DIAGONALS = np.stack([np.eye(LIGHTNESS, k=k).ravel() for k in DIMMER], axis=1).
 _COST = (DIMMER_COST * np.abs(DIMMER)).astype(np.float32)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """A view held against ``n`` others, slice by slice.
 
@@ -291,12 +291,13 @@ class Compared:
     def _trusted(self) -> Floats:
         return np.minimum(self.alike, self.most[..., None])
 
+    @cached_property
     def likeness(self) -> Floats:
         """``(n, 2)``: :meth:`similarity` and :attr:`network` of each, as far as it is trusted."""
         return np.stack([_best(self.weight, self._trusted), self.network], axis=1)
 
     def of_each(self, starts: Sequence[int]) -> Floats:
-        """The :meth:`likeness` of the view to each of several people, ``(p, 2)``: to his best view.
+        """The :attr:`likeness` of the view to each of several people, ``(p, 2)``: to his best view.
 
         NaN where no slice of his shows in both, or no view of his has a vector, so that nothing is
         known.
@@ -463,7 +464,7 @@ class Gallery:
     def log_odds_before(self, time: float, view: View, alike: Floats) -> float | None:
         """The same by what was learned before ``time``, in seconds; None where nothing was.
 
-        ``alike`` is the view's :meth:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
+        ``alike`` is the view's :attr:`~Compared.likeness` to each of the gallery, ``(n, 2)``.
         """
         old = alike[np.array([each.time for each in self._learned]) < time]
         if not len(old):
