@@ -43,6 +43,7 @@ class Light:
         self.gain = np.ones(3)
         self._mean = np.ones(3)
         self._first: Floats | None = None
+        self._table: Image | None = None
 
     def restart(self) -> None:
         """Forget what the room looked like, but not the light: the camera looks elsewhere."""
@@ -64,10 +65,9 @@ class Light:
 
     def as_before(self, image: Image) -> Image:
         """An image in the light of the first, if the light is as it was measured last."""
-        if np.abs(self.gain - 1).max() < UNCHANGED:
+        if self._table is None:
             return image
-        table = np.clip(np.arange(256)[:, None] * self.gain, 0, 255).astype(np.uint8)
-        result: Image = cv2.LUT(image, table[None])
+        result: Image = cv2.LUT(image, self._table)
         return result
 
     def _measure(self, image: Image, still: Mask) -> None:
@@ -82,3 +82,6 @@ class Light:
                 ratio = np.ascontiguousarray((self._first[usable] / small[usable]).T)
                 gain = np.median(ratio, axis=1)  # along memory, in half the time
                 self.gain = np.clip(gain, 1 / LARGEST_GAIN, LARGEST_GAIN).astype(np.float64)
+                changed = np.abs(self.gain - 1).max() >= UNCHANGED
+                levels = np.clip(np.arange(256)[:, None] * self.gain, 0, 255)
+                self._table = levels.astype(np.uint8)[None] if changed else None
