@@ -821,14 +821,15 @@ def test_a_body_is_told_from_a_plane(bulge: float, turned: float, round_: bool):
     view = DepthView(depth, 1, Intrinsics.guess(160, 120))
     seen = Silhouette.of(view, 60, 20, np.ones((80, 40), np.bool_), 0, Rim())
     assert rounded(view, seen) is round_
-    assert flat(view, None, seen) is not round_
-    half = np.ones((80, 40), np.bool_)
+    half, few = np.ones((80, 40), np.bool_), np.ones((30, 40), np.bool_)
     half[::2, 1:-1] = False
-    assert flat(view, None, Silhouette.of(view, 60, 20, half, 0, Rim())) is not round_
-    comes_in = Silhouette.of(view, 60, 20, half, 0, Rim(left=60))
-    assert flat(view, None, comes_in) is False, 'as a body fills its box'
-    few = np.ones((30, 40), np.bool_)
-    assert flat(view, None, Silhouette.of(view, 60, 20, few, 0, Rim())) is None
+    part = Silhouette.of(view, 60, 20, half, 0, Rim(left=60))
+    for walks in (False, True):
+        assert flat(view, None, seen, walks) is not round_
+        assert flat(view, None, Silhouette.of(view, 60, 20, half, 0, Rim()), walks) is not round_
+        assert flat(view, None, Silhouette.of(view, 60, 20, few, 0, Rim()), walks) is None
+    assert flat(view, None, part, walks=False) is not round_
+    assert flat(view, None, part, walks=True) is (False if round_ else None), 'as a body fills it'
 
 
 @pytest.mark.parametrize(

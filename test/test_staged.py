@@ -506,6 +506,17 @@ def test_who_turns_where_he_stood_from_the_first_frame_on_is_somebody(seed: int)
     assert np.mean(has) > 0.9
 
 
+@pytest.mark.parametrize('seed', [1, 4, 6, 12])
+def test_who_is_slim_and_seen_from_his_side_is_somebody_from_the_first_frame_on(seed: int) -> None:
+    sequence = staged(one_who_stands_quite_still, seed, 0.3)
+    targets = TargetSet('metric')
+    targets.everyone = True
+    for sample in sequence:
+        (track,) = targets.update(sample.frame).values()
+        assert track.box is not None
+        assert track.box.iou(sample.visible) > 0.6
+
+
 @pytest.mark.parametrize('seed', [2, 15])
 def test_who_has_a_persons_shape_in_most_frames_is_no_furniture(seed: int) -> None:
     """One frame in which he had none, seen from his side, and after two seconds he was the room."""
@@ -515,4 +526,16 @@ def test_who_has_a_persons_shape_in_most_frames_is_no_furniture(seed: int) -> No
         boxes = [track.box for track in targets.update(sample.frame).values()]
         has.append(any(box is not None and box.iou(sample.visible) > 0.6 for box in boxes))
     assert has[0]
+    assert np.mean(has) > 0.9
+
+
+def test_who_comes_out_of_a_doorway_is_somebody_once_he_has_a_persons_shape() -> None:
+    """His first pieces were of one surface with the door, and so he was a piece of it for good."""
+    targets, scene = TargetSet('metric'), simulate('comers_twins', 1042, RATE_HZ, size=(480, 360))
+    targets.everyone, has = True, list[bool]()
+    for index in range(50, 80):
+        sample = scene[index]
+        boxes = [track.box for track in targets.update(sample.frame).values()]
+        if index > 71:
+            has.append(any(b is not None and b.iou(sample.truths[3].visible) > 0.5 for b in boxes))
     assert np.mean(has) > 0.9

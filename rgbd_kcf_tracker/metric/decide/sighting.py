@@ -13,6 +13,7 @@ from rgbd_kcf_tracker.metric.identity.calm import Calm
 from rgbd_kcf_tracker.metric.identity.gallery import ALL_SIDES, Gallery
 from rgbd_kcf_tracker.metric.identity.person import TRAVELLED, Person
 from rgbd_kcf_tracker.metric.identity.stature import Height
+from rgbd_kcf_tracker.metric.identity.tally import Tally
 from rgbd_kcf_tracker.metric.perceive.figures import AT_REST, came
 from rgbd_kcf_tracker.metric.perceive.room import SETTLE
 from rgbd_kcf_tracker.metric.perceive.scene import Scene
@@ -63,12 +64,15 @@ def learn_sighting(
     weight = min(gone / TENTH, 1.0)
     # Before a camera that stands who has a person's shape may lie on something large; but a camera
     # may turn before a bare wall, and nothing tells.
-    if index >= 0 and (scene.stood_for < SETTLE or not person.upright):
+    if scene.stood_for >= SETTLE and person.upright:
+        if person.travelled > TRAVELLED:  # he has come from where he was joined to it
+            person.joined = Tally()
+    elif index >= 0:
         joined = account.parts.joined[index]
         if joined is not None:
             person.joined.add(joined, weight, account.time)
     if index >= 0 and not person.chosen:
-        is_flat = flat(scene.view, scene.elevation, seen)
+        is_flat = flat(scene.view, scene.elevation, seen, person.travelled > TRAVELLED)
         if is_flat is not None:
             person.flat.add(is_flat, weight, account.time)
     if not sure or (scene.since is None and person.gallery.views):

@@ -27,7 +27,9 @@ TOP = (1.0, 2.15)
 to a tall one. The backs of chairs reach up to 0.9 m, and their seats look like shoulders."""
 WIDTH = (0.25, 1.0)
 """Metres of one person's width: a chest seen from its side, with an arm before it, to arms half
-spread. Everyone at 1 Hz is a little worse from 0.18 m on (docs/experiments.md)."""
+spread."""
+SLIMMEST = 0.15
+"""The same, at the least, of what has a head or a neck: a slim chest seen from its side."""
 GROUP = 2.5
 """Metres of people who touch, at the most."""
 HEAD = (0.03, 0.2)
@@ -91,7 +93,7 @@ def upright(seen: Silhouette, k: Intrinsics, top: float | None) -> bool:
     """
     if seen.cut.top or not HEIGHT[0] <= seen.height <= HEIGHT[1]:
         return False
-    if not WIDTH[0] <= seen.width <= WIDTH[1]:
+    if not SLIMMEST <= seen.width <= WIDTH[1]:
         return False
     if top is not None and not TOP[0] <= top <= TOP[1]:
         return False
@@ -179,18 +181,23 @@ def child(seen: Silhouette, top: float | None) -> bool:
     return top - seen.height < FEET and seen.fill > SPARSE
 
 
-def flat(view: DepthView, elevation: Floats | None, seen: Silhouette) -> bool | None:
+def flat(view: DepthView, elevation: Floats | None, seen: Silhouette, walks: bool) -> bool | None:
     """Whether a silhouette is a door's leaf, or some readings of a wall, and has no person's shape.
 
-    None where too little shows to tell. Who comes in at a side may be as flat, but fills his box
-    as they do not. ``elevation`` is ``(h, w)`` metres above the floor, None where none is known.
+    None where too little shows to tell: a part of who walks may be as flat, but fills his box as
+    they do not.
+
+    Args:
+        view: the depth.
+        elevation: ``(h, w)`` metres above the floor, None where none is known.
+        seen: the silhouette.
+        walks: whether it has walked some way.
     """
     if seen.height < LENGTH[1]:
         return None
-    comes_in = seen.ends.any and SPARSE < seen.fill < SOLID
-    if comes_in or rounded(view, seen):
+    if rounded(view, seen) or upright(seen, view.intrinsics, seen.highest(elevation)):
         return False
-    return not upright(seen, view.intrinsics, seen.highest(elevation))
+    return None if walks and seen.cut.any and SPARSE < seen.fill < SOLID else True
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,7 +245,7 @@ class Shapes:
         """
         view, k = self.view, self.view.intrinsics
         tall, wide = self.sizes.height, self.sizes.width
-        possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= WIDTH[0])
+        possible = (tall >= HEIGHT[0]) & (tall <= HEIGHT[1]) & (wide >= SLIMMEST)
         possible[0] = False
         one = wide <= WIDTH[1]
         # Two chairs beside each other have two heads as well.
@@ -285,7 +292,7 @@ class Shapes:
         """
         tall, wide, people = self.sizes.height, self.sizes.width, list[Silhouette]()
         possible = moved & (tall >= HEIGHT[0]) & (tall <= HEIGHT[1])
-        for label in np.flatnonzero(possible & (wide >= WIDTH[0]) & (wide <= WIDTH[1])).tolist():
+        for label in np.flatnonzero(possible & (wide >= SLIMMEST) & (wide <= WIDTH[1])).tolist():
             seen = self._silhouette(label)
             # Of what goes on at a side any strip may be seen.
             if seen.ends.left or seen.ends.right or seen.cut.left or seen.cut.right:
