@@ -168,6 +168,12 @@ def one_who_stands_quite_still(stage: Stage, z: float) -> list[Actor]:
     return [stage.walk(stage.person(), [(0, stage.x(0.1, z), z)], [(0, 1.5)])]
 
 
+def one_who_steps_back(stage: Stage, z: float) -> list[Actor]:
+    """He stands so near from the first frame on that his head is out of the image."""
+    x = stage.x(0.1, z)
+    return [stage.walk(stage.person(), [(0, x, 1.1), (1, x, 1.1), (4, x, 2.8)], [(0, 0)])]
+
+
 def other_in_the_same_clothes(stage: Stage, z: float) -> list[Actor]:
     """He comes where the target has left, 13 cm taller or shorter at least; then he does."""
     side, out = stage.sign(), 3.0
@@ -515,6 +521,18 @@ def test_who_is_slim_and_seen_from_his_side_is_somebody_from_the_first_frame_on(
         (track,) = targets.update(sample.frame).values()
         assert track.box is not None
         assert track.box.iou(sample.visible) > 0.6
+
+
+@pytest.mark.parametrize('seed', [2, 7])
+def test_who_steps_back_from_the_camera_is_somebody_as_soon_as_his_head_shows(seed: int) -> None:
+    """Nothing of him was nearer than the room, which he had been."""
+    targets, has = TargetSet('metric'), list[bool]()
+    targets.everyone = True
+    for sample in staged(one_who_steps_back, seed, 4.0):
+        boxes = [track.box for track in targets.update(sample.frame).values()]
+        if sample.visible.y > 5:
+            has.append(any(box is not None and box.iou(sample.visible) > 0.6 for box in boxes))
+    assert np.mean(has) > 0.85
 
 
 @pytest.mark.parametrize('seed', [2, 15])

@@ -363,12 +363,15 @@ class Room:
         return GoingOn(somebody & ~beyond, beyond)
 
     def moved_part_of(self, surfaces: Surfaces, k: Intrinsics) -> Mask:
-        """Surfaces of the last view, ``(n,)`` bool, of which some stands before it, but not all.
+        """Surfaces of the last view, ``(n,)`` bool, of which some is not where the room was.
 
-        ``k`` is of the view.
+        Those are left out that stand before it as a whole. ``k`` is of the view.
         """
-        before = np.bincount(surfaces.labels[self.before], minlength=len(surfaces))
-        return _enough(before, surfaces, k) & (before < ALL * surfaces.pixels)
+        before, moved = (
+            np.bincount(surfaces.labels[each], minlength=len(surfaces))
+            for each in (self.before, self.before | (self._farther > 0))
+        )
+        return _enough(moved, surfaces, k) & (before < ALL * surfaces.pixels)
 
     def update(
         self,
