@@ -300,8 +300,7 @@ class Shapes:
             head = seen.mask[: max(int(HEAD[1] * self.view.intrinsics.fy / seen.depth), 1)]
             if before[seen.rows, seen.cols][: len(head)][head].mean() > STIRS:
                 continue
-            top = seen.highest(self.elevation)
-            if (top is None or top > GROWN) and upright(seen, self.view.intrinsics, top):
+            if upright(seen, self.view.intrinsics, seen.highest(self.elevation)):
                 people.append(seen)
         return together(people, self.view.shape)
 
