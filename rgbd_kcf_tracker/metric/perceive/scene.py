@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -60,6 +60,7 @@ class Scene:
         known_for: ``(h, w)`` float32, see :attr:`Room.known_for`.
         surfaces: what stands on it.
         sizes: places and sizes of these.
+        shapes: the same with their silhouettes.
         rim: columns and rows of the view that never have a reading.
         image: ``(h, w, 3)`` BGR, in the light of the first frame.
         codes: of its colours.
@@ -86,6 +87,7 @@ class Scene:
     known_for: Floats
     surfaces: Surfaces
     sizes: Sizes
+    shapes: Shapes
     rim: Rim
     image: Image
     codes: ColorCodes
@@ -94,7 +96,6 @@ class Scene:
     stood_for: float
     since: float | None
     lately: Sequence[Silhouette]
-    _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
     @cached_property
     def large(self) -> Mask:
@@ -115,12 +116,7 @@ class Scene:
 
     def silhouette(self, label: int) -> Silhouette:
         """One surface as a silhouette; the same for whoever asks."""
-        seen = self._silhouettes.get(label)
-        if seen is None:
-            left, top, mask = self.surfaces.crop(label)
-            seen = Silhouette.of(self.view, left, top, mask, label, self.rim)
-            self._silhouettes[label] = seen
-        return seen
+        return self.shapes.silhouette(label)
 
 
 class SceneReader:
@@ -225,6 +221,7 @@ class SceneReader:
             known_for=self.room.known_for,
             surfaces=surfaces,
             sizes=sizes,
+            shapes=shapes,
             rim=rim,
             image=image,
             codes=ColorCodes(image),

@@ -8,7 +8,7 @@ For a person who has not moved yet nothing else tells them from furniture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import median
 
 import numpy as np
@@ -235,6 +235,7 @@ class Shapes:
     forward: Floats
     right: FloatArray
     rim: Rim
+    _silhouettes: dict[int, Silhouette] = field(default_factory=dict)
 
     def upright(self, whole: bool = False) -> UprightPeople:
         """All surfaces and parts of them that have a person's shape.
@@ -254,7 +255,7 @@ class Shapes:
         for label in np.flatnonzero(possible & (one | several)).tolist():
             found = []
             if one[label]:
-                single = self._silhouette(label)
+                single = self.silhouette(label)
                 found = [single] if upright(single, k, single.highest(self.elevation)) else []
             if not found and several[label]:
                 crop = self.surfaces.crop(label)
@@ -293,7 +294,7 @@ class Shapes:
         tall, wide, people = self.sizes.height, self.sizes.width, list[Silhouette]()
         possible = moved & (tall >= HEIGHT[0]) & (tall <= HEIGHT[1])
         for label in np.flatnonzero(possible & (wide >= SLIMMEST) & (wide <= WIDTH[1])).tolist():
-            seen = self._silhouette(label)
+            seen = self.silhouette(label)
             # Of what goes on at a side any strip may be seen.
             if seen.ends.left or seen.ends.right or seen.cut.left or seen.cut.right:
                 continue
@@ -304,6 +305,11 @@ class Shapes:
                 people.append(seen)
         return together(people, self.view.shape)
 
-    def _silhouette(self, label: int) -> Silhouette:
-        left, upper, mask = self.surfaces.crop(label)
-        return Silhouette.of(self.view, left, upper, mask, label, self.rim)
+    def silhouette(self, label: int) -> Silhouette:
+        """One surface as a silhouette; the same for whoever asks."""
+        seen = self._silhouettes.get(label)
+        if seen is None:
+            left, upper, mask = self.surfaces.crop(label)
+            seen = Silhouette.of(self.view, left, upper, mask, label, self.rim)
+            self._silhouettes[label] = seen
+        return seen
