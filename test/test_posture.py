@@ -266,6 +266,16 @@ def test_of_several_low_ones_he_is_the_one_that_is_most_where_he_was_or_below():
     assert _low(scene, [], [figure(110, 70, 60, 30)]) == [], 'beside'
 
 
+def test_who_lies_shows_whole_where_his_legs_alone_did_and_falls_no_deeper():
+    """As when the other has gone who walked over him, of whom his legs were told apart."""
+    depth = np.full((ROWS, COLS), 2.0, np.float32)
+    left, top, wide, high = 90, 90, 20, 10
+    legs = silhouette(depth, left, top, np.ones((high, wide), np.bool_))
+    seen = silhouette(depth, 40, 86, np.ones((14, 70), np.bool_))
+    whole = Figure(seen, np.zeros(2), False)
+    assert _low(SimpleNamespace(lately=[legs]), [], [whole]) == [whole]
+
+
 def test_the_colours_of_the_room_are_learned_where_it_shows_and_what_differs_is_told():
     paint, image = Paint(), texture(3)
     assert paint.differs(image) is None

@@ -220,14 +220,18 @@ def _low(scene: Scene, found: list[Figure], refused: list[Figure]) -> list[Figur
 def _shared(before: Silhouette, seen: Silhouette) -> float:
     """Share of the smaller of two boxes that both have, 0 to 1.
 
-    That about where somebody was, and as far below as he may have fallen, and a silhouette's.
+    That about where somebody was, or about that and as far below as he may have fallen, and a
+    silhouette's: who lies already falls no deeper.
     """
     if abs(seen.depth - before.depth) > depth_step(before.depth):
         return 0.0
-    deeper = FALL / before.height * before.mask.shape[0]
-    was = Box(before.left, before.top, before.mask.shape[1], before.mask.shape[0] + deeper)
+    rows, cols = before.mask.shape
     now = Box(seen.left, seen.top, seen.mask.shape[1], seen.mask.shape[0])
-    return was.intersection(now) / min(was.area, now.area)
+    was = (
+        Box(before.left, before.top, cols, rows + fallen)
+        for fallen in (0.0, FALL / before.height * rows)
+    )
+    return max(each.intersection(now) / min(each.area, now.area) for each in was)
 
 
 def makes_figure(scene: Scene, seen: Silhouette) -> bool:
