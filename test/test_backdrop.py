@@ -89,6 +89,18 @@ def test_a_box_that_has_stayed_behind_is_told_where_the_target_is(walked):
     assert outline.cx == pytest.approx(body.cx, abs=0.5)
 
 
+def test_what_is_twice_as_large_as_the_target_is_more_than_one_person(walked):
+    """Two had come beside where it was hidden, neither of whom was known to be another."""
+    backdrop, body = walked
+    for k in range(3):  # something hides it
+        backdrop.see(picture(seed=90 + k), body, 0.1)
+        backdrop.miss(body)
+    for wide, alone in ((20, True), (44, False)):
+        backdrop.see(picture(Box(body.x, body.y, wide, body.height), seed=95), body, 0.1)
+        outline = backdrop.outline(body, red)
+        assert (outline is not None) == alone
+
+
 def test_of_whom_has_not_moved_the_box_stays_and_an_arm_is_added():
     backdrop = Backdrop(picture(BODY), BODY)
     for k in range(1, 5):

@@ -68,6 +68,9 @@ other had his arm or his shadow."""
 GROWN = 1.4
 """Times its area when it was alone above which a piece is still two who have met: two people are
 twice as much, and who stretches out an arm has a tenth more."""
+TWO = 2.0
+"""Times the area of as much of the box as it fills from which a piece is more than one person: who
+spreads his arms has a tenth more."""
 PARTED = 20
 """Frames in which two who have met may part again, the one hidden by the other between: as long as
 somebody takes to pass before another at the pace of a walk and 10 Hz."""
@@ -228,7 +231,8 @@ class Backdrop:
         bounds = mask_box(body)
         if bounds is None:
             return None
-        self.met = self._meets(body, self._others[part])
+        several = bool(np.count_nonzero(body) > TWO * self._fill * b.area > 0)
+        self.met = self._meets(body, self._others[part]) or several
         if self.met:
             return None
         self._mine[:] = False
