@@ -16,7 +16,8 @@ from rgbd_kcf_tracker.ros.launching import CAMERA, chosen_camera, declared, give
 
 ARGUMENTS = {
     **CAMERA,
-    'tracker': ('tracker', 'Name of the tracker node, with its namespace.'),
+    'namespace': ('', 'Namespace of the node; the tracker, too, is looked for in it.'),
+    'tracker': ('tracker', 'Name of the tracker node; with a slash before it, with its namespace.'),
     'host': ('127.0.0.1', 'Address to listen on.'),
     'port': ('8080', 'TCP port of the page.'),
     'rate': ('10.0', 'Moments shown each second, at most.'),
@@ -39,6 +40,7 @@ def start(context: LaunchContext) -> list:
             package='rgbd_kcf_tracker',
             executable='viewer',
             name='viewer',
+            namespace=values['namespace'],
             parameters=[parameters],
             remappings=remappings,
             output='screen',

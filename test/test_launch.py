@@ -239,7 +239,8 @@ def test_the_viewer_looks_at_the_camera_of_the_tracker(launch_modules: None) -> 
     from rgbd_kcf_tracker.view.live_page import ViewerParameters
 
     given = {'camera': 'orbbec', 'compressed': 'true', 'port': '9000', 'info_topic': '/my/info'}
-    (node,) = started('viewer.launch.py', **given)
+    (node,) = started('viewer.launch.py', namespace='robot1', **given)
+    assert node.named['namespace'] == 'robot1'
     tracker, _ = start_tracker(camera='orbbec', compressed='true', info_topic='/my/info')
     assert node.named['remappings'] == tracker.named['remappings']
     (parameters,) = node.named['parameters']
