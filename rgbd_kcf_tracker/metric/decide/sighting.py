@@ -61,18 +61,19 @@ def learn_sighting(
         walks = scene.stood_for >= AT_REST or (not seen.cut.any and came(scene, seen))
         person.moved_to(place, account.time, walks)
     person.last, person.figure = seen, index >= 0
+    walked = person.travelled > TRAVELLED
     weight = min(gone / TENTH, 1.0)
     # Before a camera that stands who has a person's shape may lie on something large; but a camera
     # may turn before a bare wall, and nothing tells.
     if scene.stood_for >= SETTLE and person.upright:
-        if person.travelled > TRAVELLED:  # he has come from where he was joined to it
+        if walked:  # he has come from where he was joined to it
             person.joined = Tally()
     elif index >= 0:
         joined = account.parts.joined[index]
         if joined is not None:
             person.joined.add(joined, weight, account.time)
     if index >= 0 and not person.chosen:
-        is_flat = flat(scene.view, scene.elevation, seen, person.travelled > TRAVELLED)
+        is_flat = flat(scene.view, scene.elevation, seen, walked)
         if is_flat is not None:
             person.flat.add(is_flat, weight, account.time)
     if not sure or (scene.since is None and person.gallery.views):
@@ -80,7 +81,7 @@ def learn_sighting(
     person.area = max(person.area, seen.area)
     # What is small lies as near to the room as the room's depth is uncertain.
     # Before the room is known anything may seem to stand before it, but not walk.
-    known = account.settled or person.travelled > TRAVELLED
+    known = account.settled or walked
     if known and not person.mobile and seen.area > WHOLE:
         person.mobile = bool(seen.pixels(scene.before).mean() > 1 - PART_OF_ROOM)
     view = account.look(seen)

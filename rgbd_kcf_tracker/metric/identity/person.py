@@ -102,9 +102,10 @@ class Person:
         met: numbers of those who were seen at the same time, or too far off for him to have walked
             there, and so are surely somebody else.
         travelled: metres, the farthest from where it was first seen.
-        joined: the shares of its outline where it is joined to something large; of what has a
-            person's shape only as seen by a camera that has moved lately.
-        flat: 1 for each sighting as something flat, 0 for others, see
+        joined: the shares of its outline where it is joined to something large. Before a camera
+            that stands nothing is added of what has had a person's shape, and none is kept of who
+            has walked as well.
+        flat: 1 for each sighting as something flat, 0 for others that tell, see
             :func:`~rgbd_kcf_tracker.metric.perceive.upright.flat`; none of who was chosen.
         again: log-odds that it is one of those who had gone before it came, by its looks alone, see
             :class:`~rgbd_kcf_tracker.metric.decide.arrivals.Arrival`.

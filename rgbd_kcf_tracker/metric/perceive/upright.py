@@ -73,8 +73,8 @@ FITS, PIXELS, OUTLIER = 3, 600, 4.0
 SPARSE, SOLID = 0.3, 0.7
 """Shares of the box that a flat thing fills, at the most and at the least: a wall of which readings
 come and go a quarter, a door's leaf nine tenths, in the median, and real people 0.55."""
-STIRS = 0.5
-"""Share of a head before which something stands from which it has not been there from the first."""
+HEAD_CAME = 0.5
+"""Share of a head that stands before the room from which it has come there: most of it."""
 CHILD, FEET = 0.8, 0.25
 """Metres that show of a child of four, who is 1.05 m tall, at the least, and above the floor where
 that begins at the most: feet are as near to the floor as its height is uncertain."""
@@ -299,7 +299,7 @@ class Shapes:
             if seen.ends.left or seen.ends.right or seen.cut.left or seen.cut.right:
                 continue
             head = seen.mask[: max(int(HEAD[1] * self.view.intrinsics.fy / seen.depth), 1)]
-            if before[seen.rows, seen.cols][: len(head)][head].mean() > STIRS:
+            if before[seen.rows, seen.cols][: len(head)][head].mean() > HEAD_CAME:
                 continue
             if upright(seen, self.view.intrinsics, seen.highest(self.elevation)):
                 people.append(seen)
