@@ -202,7 +202,8 @@ class Backdrop:
             posterior: how likely each pixel of an image is the target's by its colour.
 
         Returns:
-            None where nothing moves there, or two have met who cannot be told apart.
+            None where nothing moves there, two have met who cannot be told apart, or it is more
+            than one person.
         """
         width, height = box.width + ASIDE * box.height, HIGH * box.height
         part = part_in(self._last.shape, Box.from_center(box.cx, box.cy, width, height))
@@ -231,9 +232,8 @@ class Backdrop:
         bounds = mask_box(body)
         if bounds is None:
             return None
-        several = bool(np.count_nonzero(body) > TWO * self._fill * b.area > 0)
-        self.met = self._meets(body, self._others[part]) or several
-        if self.met:
+        self.met = self._meets(body, self._others[part])
+        if self.met or np.count_nonzero(body) > TWO * self._fill * b.area > 0:
             return None
         self._mine[:] = False
         self._mine[part] = grown(body)
